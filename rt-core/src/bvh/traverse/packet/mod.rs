@@ -13,6 +13,7 @@
 //! both give the same bits.
 
 mod load;
+mod strategy;
 mod switch_to_single;
 mod triangles;
 mod walk;
@@ -20,10 +21,12 @@ mod walk;
 use crate::bvh::Unit;
 use crate::bvh::layout::wide::ChildRef;
 use crate::bvh::query::{HitQuery, TriangleTest};
+use crate::bvh::traverse::single::RaySetup;
 use crate::bvh::traverse::tree_view::TreeView;
 use crate::ray::{HitBlock, LANES, NO_HIT};
 use fearless_simd::{Select, Simd, SimdBase, SimdMask, f32x16, mask32x16, u32x16};
 pub(crate) use load::PacketLimits;
+use strategy::{Strategy, StrategyChoice};
 use triangles::Triangles;
 
 /// Largest number of groups of sixteen rays in a packet.
@@ -69,26 +72,11 @@ pub(crate) struct Packet {
     shear_bounds: [[Row; 2]; 2],
     /// Largest difference from `shear_mid` over all groups.
     shear_span: [f32; 2],
-    /// Whether per-ray box tests pay off with a common origin, learned from earlier packets: one
-    /// entry for closest hits, one for occlusion.
-    slabs: [SlabHeuristic; 2],
-}
-
-/// Decides whether per-ray box tests reject enough of the groups whose intervals intersect a box.
-/// They do so for shadow rays from points at many depths, but not for tiles of pixels. No measure
-/// of the intervals predicted this as well as trying. Results do not depend on it.
-///
-/// It keeps means of shares, not sums of counts. With sums, packets with much work outweighed later
-/// ones for a thousand packets: rays from a light over 3,000 meshes took 30 times as long after
-/// another view than without it.
-#[derive(Debug, Clone, Copy, Default)]
-struct SlabHeuristic {
-    /// Mean share of the tested groups that were kept.
-    kept: f32,
-    /// Mean number of rays in a tested group that intersect the box.
-    rays: f32,
-    /// Packets since the last trial.
-    since: u8,
+    /// Inner nodes' rays that leave the packet: group times sixteen plus lane, and set-up.
+    leaving: Vec<(usize, RaySetup)>,
+    /// The way to trace, learned from earlier packets: closest hits or occlusion, and separate
+    /// origins or a common one.
+    choices: [[StrategyChoice; 2]; 2],
 }
 
 /// Counts of per-ray box tests in one traversal.
@@ -98,45 +86,6 @@ struct SlabCounts {
     tested: u32,
     kept: u32,
     rays: u32,
-}
-
-impl SlabHeuristic {
-    /// The tests are tried again after this many packets.
-    const TRIAL: u8 = 16;
-    /// Above this share of kept groups the tests cost more than they save. Measured shares on one
-    /// million triangles: 0.83 and 0.94 for pixels (orbit, close by), where the tests cost a tenth
-    /// of the time; 0.66 and 0.93 for rays from a light, where they save a third and cost a
-    /// quarter.
-    const KEPT: f32 = 0.75;
-    /// When a tested group has fewer rays than this on average, the packet loses coherence, and the
-    /// tests find the few rays that are traced faster alone. One value was tried: rays from a light
-    /// among pipes took 94 instead of 133 ms; among isosurfaces nothing changed.
-    const RAYS: f32 = 5.0;
-
-    /// Weights of a packet in the means: tests that would have paid count more, because without
-    /// them a packet of diverging rays takes many times as long, and with them any packet takes at
-    /// most a quarter longer.
-    const PAYS: f32 = 0.5;
-    const DOES_NOT_PAY: f32 = 0.1;
-
-    fn next(&mut self) -> bool {
-        self.since = if self.since >= Self::TRIAL { 0 } else { self.since + 1 };
-        Self::pays(self.kept, self.rays) || self.since == 0
-    }
-
-    fn pays(kept: f32, rays: f32) -> bool {
-        kept <= Self::KEPT || rays <= Self::RAYS
-    }
-
-    fn learn(&mut self, SlabCounts { tested, kept, rays }: SlabCounts) {
-        if tested == 0 {
-            return;
-        }
-        let (kept, rays) = (kept as f32 / tested as f32, rays as f32 / tested as f32);
-        let weight = if Self::pays(kept, rays) { Self::PAYS } else { Self::DOES_NOT_PAY };
-        self.kept += weight * (kept - self.kept);
-        self.rays += weight * (rays - self.rays);
-    }
 }
 
 impl Packet {
@@ -164,7 +113,8 @@ impl Packet {
             shear_mid: [0.0; 2],
             shear_bounds: [[[0.0; LANES]; 2]; 2],
             shear_span: [0.0; 2],
-            slabs: [SlabHeuristic::default(); 2],
+            leaving: Vec::new(),
+            choices: [[StrategyChoice::new(); 2]; 2],
         })
     }
 
@@ -219,22 +169,27 @@ impl Packet {
         simd: S,
         tree: &TreeView<'_>,
     ) {
-        if !self.common_origin {
-            // Combined intervals of origins and directions are weak bounds: measured seven times
-            // slower without per-ray tests.
-            self.walk::<S, _, IntervalsAndRays>(
-                simd,
-                tree,
-                &mut Triangles::<T, Q, SeparateOrigins>::new(),
-            );
-        } else if self.slabs[Q::ANY as usize].next() {
-            let mut leaves = Triangles::<T, Q, CommonOrigin>::new();
-            let slabs = self.walk::<S, _, IntervalsAndRays>(simd, tree, &mut leaves);
-            self.slabs[Q::ANY as usize].learn(slabs);
-        } else {
-            let mut leaves = Triangles::<T, Q, CommonOrigin>::new();
-            self.walk::<S, _, IntervalsOnly>(simd, tree, &mut leaves);
-        }
+        let choice = &mut self.choices[Q::ANY as usize][self.common_origin as usize];
+        let (strategy, start) = choice.next(self.common_origin);
+        let most_leaving = strategy.most_leaving();
+        let counts = match (self.common_origin, strategy) {
+            (false, _) => {
+                let mut leaves = Triangles::<T, Q, SeparateOrigins>::new();
+                self.walk::<S, _, IntervalsAndRays>(simd, tree, &mut leaves, most_leaving)
+            }
+            (true, Strategy::Intervals) => {
+                let mut leaves = Triangles::<T, Q, CommonOrigin>::new();
+                self.walk::<S, _, IntervalsOnly>(simd, tree, &mut leaves, most_leaving)
+            }
+            (true, Strategy::Rays | Strategy::RaysLeaveEarly) => {
+                let mut leaves = Triangles::<T, Q, CommonOrigin>::new();
+                self.walk::<S, _, IntervalsAndRays>(simd, tree, &mut leaves, most_leaving)
+            }
+        };
+        let seconds = start.map_or(0.0, |start| start.elapsed().as_secs_f32());
+        let groups = self.groups.count_ones().max(1) as f32;
+        let choice = &mut self.choices[Q::ANY as usize][self.common_origin as usize];
+        choice.learn(strategy, counts, seconds / groups);
     }
 
     /// Collects the leaves of a hierarchy that some group of the packet may reach before its limit,
@@ -245,7 +200,7 @@ impl Packet {
         tree: &TreeView<'_>,
         out: &mut Vec<(f32, ChildRef)>,
     ) {
-        self.walk::<S, _, IntervalsOnly>(simd, tree, &mut CollectLeaves(out));
+        self.walk::<S, _, IntervalsOnly>(simd, tree, &mut CollectLeaves(out), 0);
     }
 }
 
@@ -355,38 +310,4 @@ impl<S: Simd> PacketLeaf<S> for CollectLeaves<'_> {
 #[inline(always)]
 fn load_row<S: Simd>(simd: S, row: &Row) -> f32x16<S> {
     f32x16::from_slice(simd, row)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn packets_of_another_scene_are_learned_within_a_hundred_packets() {
-        let mut slabs = SlabHeuristic::default();
-        assert!(slabs.next(), "untried tests are tried");
-        // Tiles of pixels: much work, no gain.
-        for _ in 0..1000 {
-            if slabs.next() {
-                slabs.learn(SlabCounts { tested: 3000, kept: 2850, rays: 40_000 });
-            }
-        }
-        assert!((0..16).filter(|_| slabs.next()).count() <= 1);
-        // Diverging rays: little work, because the rays soon leave the packet.
-        let mut packets = 0;
-        while packets < 1000 && !SlabHeuristic::pays(slabs.kept, slabs.rays) {
-            packets += 1;
-            if slabs.next() {
-                slabs.learn(SlabCounts { tested: 40, kept: 30, rays: 60 });
-            }
-        }
-        assert!(packets <= 100, "{packets} packets without the tests");
-    }
-
-    #[test]
-    fn a_packet_that_tested_nothing_teaches_nothing() {
-        let mut slabs = SlabHeuristic { kept: 0.9, rays: 12.0, since: 3 };
-        slabs.learn(SlabCounts::default());
-        assert_eq!((slabs.kept, slabs.rays), (0.9, 12.0));
-    }
 }

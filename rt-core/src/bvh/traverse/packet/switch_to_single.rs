@@ -17,9 +17,8 @@ use crate::stats::{Counter, count};
 use fearless_simd::Simd;
 use std::marker::PhantomData;
 
-/// With this many rays or fewer. Not tuned; with it, shadow rays from a surface gained 6
-/// % in the whole view of one million triangles (records `peers` before and after).
-pub(super) const MAX_SINGLE_RAYS: usize = 4;
+/// Rays under way at a time, as for rays in any direction.
+const IN_TURNS: usize = 8;
 
 impl Packet {
     /// The data that a ray needs to continue alone: the packet's own numbers, so that its results
@@ -39,8 +38,8 @@ impl Packet {
         }
     }
 
-    /// The rays of `lanes` in the groups of `reached`, at most [`MAX_SINGLE_RAYS`], through the
-    /// subtree at `start`. Returns the groups with new hits.
+    /// The rays of `lanes` in the groups of `reached` through the subtree at `start`. Returns the
+    /// groups with new hits.
     #[inline(never)]
     pub(super) fn switch_to_single<S: Simd, T: TriangleTest, Q: HitQuery>(
         &mut self,
@@ -53,9 +52,8 @@ impl Packet {
         simd.vectorize(
             #[inline(always)]
             || {
-                let mut setups = [self.setup(0, 0); MAX_SINGLE_RAYS];
-                let mut at = [(0, 0); MAX_SINGLE_RAYS];
-                let mut rays = 0;
+                let mut leaving = std::mem::take(&mut self.leaving);
+                leaving.clear();
                 let mut groups = reached;
                 while groups != 0 {
                     let g = groups.trailing_zeros() as usize & 15;
@@ -64,58 +62,38 @@ impl Packet {
                     while rest != 0 {
                         let lane = rest.trailing_zeros() as usize & 15;
                         rest &= rest - 1;
-                        setups[rays % MAX_SINGLE_RAYS] = self.setup(g, lane);
-                        at[rays % MAX_SINGLE_RAYS] = (g, lane);
-                        rays += 1;
+                        leaving.push((g * LANES + lane, self.setup(g, lane)));
                     }
                 }
-                debug_assert!(rays <= MAX_SINGLE_RAYS, "{rays} rays");
-                count(Counter::Fallbacks, rays as u64);
-                let rays = LaneRays {
-                    setups: &setups,
-                    at: &at,
-                    next: 0,
-                    len: rays,
-                    start,
-                    changed: 0,
-                    packet: self,
-                };
-                if Q::ANY {
+                count(Counter::Fallbacks, leaving.len() as u64);
+                let rays = LaneRays { rays: leaving.iter(), start, changed: 0, packet: self };
+                let changed = if Q::ANY {
                     let mut queue = AnyRays::<T>(rays, PhantomData);
-                    traverse_interleaved::<MAX_SINGLE_RAYS, _, _>(simd, tree, &mut queue);
+                    traverse_interleaved::<IN_TURNS, _, _>(simd, tree, &mut queue);
                     queue.0.changed
                 } else {
                     let mut queue = ClosestRays::<T>(rays, PhantomData);
-                    traverse_interleaved::<MAX_SINGLE_RAYS, _, _>(simd, tree, &mut queue);
+                    traverse_interleaved::<IN_TURNS, _, _>(simd, tree, &mut queue);
                     queue.0.changed
-                }
+                };
+                self.leaving = leaving;
+                changed
             },
         )
     }
 }
 
 struct LaneRays<'a, 'r> {
-    setups: &'r [RaySetup; MAX_SINGLE_RAYS],
-    at: &'a [(usize, usize); MAX_SINGLE_RAYS],
-    next: usize,
-    len: usize,
+    rays: std::slice::Iter<'r, (usize, RaySetup)>,
     start: ChildRef,
     changed: u16,
     packet: &'a mut Packet,
 }
 
-impl<'r> LaneRays<'_, 'r> {
-    /// The next ray: its number, set-up, group and lane.
-    #[inline(always)]
-    fn take(&mut self) -> Option<(usize, &'r RaySetup, usize, usize)> {
-        if self.next >= self.len {
-            return None;
-        }
-        let number = self.next % MAX_SINGLE_RAYS;
-        self.next += 1;
-        let (g, lane) = self.at[number];
-        Some((number, &self.setups[number], g & 15, lane & 15))
-    }
+/// Group and lane of ray `number`.
+#[inline(always)]
+fn place(number: usize) -> (usize, usize) {
+    (number / LANES & 15, number % LANES)
 }
 
 struct AnyRays<'a, 'r, T>(LaneRays<'a, 'r>, PhantomData<T>);
@@ -125,7 +103,8 @@ impl<'r, S: Simd, T: TriangleTest> RayQueue<'r, S> for AnyRays<'_, 'r, T> {
 
     #[inline(always)]
     fn next(&mut self, stack: &mut RayStack<'_>) -> Option<RayTask<'r, Self::Leaf>> {
-        let (number, ray, g, lane) = self.0.take()?;
+        let &(number, ref ray) = self.0.rays.next()?;
+        let (g, lane) = place(number);
         let t_max = self.0.packet.t[g][lane];
         stack.push(self.0.start.0 as u64);
         Some(RayTask { number, ray, t_max, leaf: AnyLeaf::new(ray, t_max) })
@@ -134,8 +113,7 @@ impl<'r, S: Simd, T: TriangleTest> RayQueue<'r, S> for AnyRays<'_, 'r, T> {
     #[inline(always)]
     fn done(&mut self, number: usize, leaf: Self::Leaf) {
         if leaf.found {
-            let (g, lane) = self.0.at[number % MAX_SINGLE_RAYS];
-            let (g, lane) = (g & 15, lane & 15);
+            let (g, lane) = place(number);
             self.0.packet.hit[g] |= 1 << lane;
             self.0.packet.active[g] &= !(1 << lane);
             self.0.packet.t[g][lane] = -1.0;
@@ -151,7 +129,8 @@ impl<'r, S: Simd, T: TriangleTest> RayQueue<'r, S> for ClosestRays<'_, 'r, T> {
 
     #[inline(always)]
     fn next(&mut self, stack: &mut RayStack<'_>) -> Option<RayTask<'r, Self::Leaf>> {
-        let (number, ray, g, lane) = self.0.take()?;
+        let &(number, ref ray) = self.0.rays.next()?;
+        let (g, lane) = place(number);
         let p = &self.0.packet;
         let found = p.hit[g] >> lane & 1 == 1;
         let best = ClosestTri {
@@ -170,8 +149,7 @@ impl<'r, S: Simd, T: TriangleTest> RayQueue<'r, S> for ClosestRays<'_, 'r, T> {
     fn done(&mut self, number: usize, leaf: Self::Leaf) {
         let b = leaf.best;
         if b.found {
-            let (g, lane) = self.0.at[number % MAX_SINGLE_RAYS];
-            let (g, lane) = (g & 15, lane & 15);
+            let (g, lane) = place(number);
             let p = &mut self.0.packet;
             p.hit[g] |= 1 << lane;
             (p.t[g][lane], p.u[g][lane], p.v[g][lane], p.prim[g][lane]) = (b.t, b.u, b.v, b.prim);

@@ -1,6 +1,5 @@
 //! Traversal of the hierarchy by a packet.
 
-use super::switch_to_single::MAX_SINGLE_RAYS;
 use super::{BoxTest, Packet, PacketLeaf, PacketOrigin, SlabCounts, load_row};
 use crate::bvh::Unit;
 use crate::bvh::layout::wide::{CHILD_ROW, ChildRef, NODE_UNITS, STACK_SIZE};
@@ -84,17 +83,19 @@ impl Packet {
         near.simd_le(far).to_bitmask() as u16
     }
 
-    /// Traverses the hierarchy. Returns the counts of the tests ray by ray.
+    /// Traverses the hierarchy. With per-ray tests, rays leave the packet at boxes that at most
+    /// `most_leaving` of them hit. Returns the counts of the tests ray by ray.
     #[inline(never)]
     pub(super) fn walk<S: Simd, L: PacketLeaf<S>, B: BoxTest>(
         &mut self,
         simd: S,
         tree: &TreeView<'_>,
         leaves: &mut L,
+        most_leaving: u32,
     ) -> SlabCounts {
         simd.vectorize(
             #[inline(always)]
-            || self.walk_body::<S, L, B>(simd, tree, leaves),
+            || self.walk_body::<S, L, B>(simd, tree, leaves, most_leaving),
         )
     }
 
@@ -104,6 +105,7 @@ impl Packet {
         simd: S,
         tree: &TreeView<'_>,
         leaves: &mut L,
+        most_leaving: u32,
     ) -> SlabCounts {
         let mut slabs = SlabCounts::default();
         if self.groups == 0 {
@@ -211,7 +213,7 @@ impl Packet {
                         continue;
                     }
                 }
-                if !child.is_leaf() && rays > MAX_SINGLE_RAYS as u32 {
+                if !child.is_leaf() && rays > most_leaving {
                     node_at = child.unit();
                     groups = reached;
                     continue 'nodes;
