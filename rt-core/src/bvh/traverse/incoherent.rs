@@ -6,12 +6,25 @@ use crate::bvh::Unit;
 use crate::bvh::layout::wide::NODE_UNITS;
 use crate::bvh::query::{HitQuery, TriangleTest};
 use crate::bvh::traverse::packet::GROUPS;
+use crate::bvh::traverse::timed_choice::TimedChoice;
 use crate::ray::{HitBlock, RayBlock};
 use fearless_simd::{Select, Simd, SimdBase, SimdMask, f32x8, f32x16, mask32x16};
+use std::cell::Cell;
 
 /// Rays of a block share the start of the traversal when their origins lie within this part of the
 /// tree's box, along every axis.
 const CLOSE: f32 = 0.125;
+
+/// The ways to trace blocks whose rays start together.
+const SHARED_START: usize = 0;
+const FROM_THE_ROOT: usize = 1;
+
+thread_local! {
+    /// The faster way for closest hits and for occlusion. From the root in turns, ambient occlusion
+    /// is up to 1.4 times slower on isosurfaces and 1.1 times faster among long thin triangles.
+    static CHOICES: Cell<[TimedChoice<2>; 2]> =
+        const { Cell::new([TimedChoice::new(SHARED_START); 2]) };
+}
 
 /// Traces blocks of rays and writes the results into `hits`, as long as `rays` (for occlusion,
 /// `prim` is 0 where something blocks the ray).
@@ -24,13 +37,19 @@ pub(crate) fn trace<S: Simd, T: TriangleTest, Q: HitQuery>(
     instance: u32,
 ) {
     for (rays, hits) in rays.chunks(GROUPS).zip(hits.chunks_mut(GROUPS)) {
+        let mut choices = CHOICES.get();
+        let choice = &mut choices[Q::ANY as usize];
+        let (way, start) = choice.next(|_| true);
+        let mut together = 0;
         simd.vectorize(
             #[inline(always)]
             || {
                 let reach = close_reach(simd, tree);
                 let mut apart = 0u16;
                 for (b, (r, h)) in rays.iter().zip(&mut *hits).enumerate() {
-                    if start_together(simd, r, reach) {
+                    let shares = start_together(simd, r, reach);
+                    together += u32::from(shares);
+                    if shares && way == SHARED_START {
                         hybrid::trace::<S, T, Q>(simd, tree, r, h, instance);
                     } else {
                         apart |= 1 << b;
@@ -41,6 +60,11 @@ pub(crate) fn trace<S: Simd, T: TriangleTest, Q: HitQuery>(
                 }
             },
         );
+        // Blocks whose rays start apart have only one way.
+        if together == rays.len() as u32 {
+            choice.learn(start.map_or(0.0, |t| t.elapsed().as_secs_f32()) / rays.len() as f32);
+            CHOICES.set(choices);
+        }
     }
 }
 

@@ -8,6 +8,7 @@ pub(crate) mod interleaved;
 pub(crate) mod packet;
 mod scattered;
 pub(crate) mod single;
+pub(crate) mod timed_choice;
 pub(crate) mod tree_view;
 pub(crate) mod triangle_leaf;
 
