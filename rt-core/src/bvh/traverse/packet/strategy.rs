@@ -2,8 +2,8 @@
 //!
 //! Bounds on its rays fit tiles of pixels on large triangles, per-ray tests fit rays that diverge,
 //! and where triangles are smaller than pixels the rays do best alone. With rules on counts (the
-//! share of rays that a box keeps), tiles of a terrain took 1.7 times as long as they need, and rays
-//! from a light 2.2 times. So time decides. Every way gives the same bits.
+//! share of rays that a box keeps), tiles of a terrain took 1.7 times as long as they need, and
+//! rays from a light 2.2 times. So time decides. Every way gives the same bits.
 
 use super::SlabCounts;
 use crate::bvh::traverse::timed_choice::TimedChoice;
@@ -45,8 +45,8 @@ pub(super) struct StrategyChoice {
 }
 
 impl StrategyChoice {
-    /// Intervals alone are tried only if per-ray tests keep more than this share of the groups, with
-    /// more rays in a group. Otherwise they can take 60 times as long.
+    /// Intervals alone are tried only if per-ray tests keep more than this share of the groups,
+    /// with more rays in a group. Otherwise they can take 60 times as long.
     const KEPT: f32 = 0.75;
     const RAYS: f32 = 5.0;
 
