@@ -49,7 +49,7 @@ pub(crate) fn trace<S: Simd, T: TriangleTest, Q: HitQuery>(
                 for (b, (r, h)) in rays.iter().zip(&mut *hits).enumerate() {
                     let shares = start_together(simd, r, reach);
                     together += u32::from(shares);
-                    if shares && way == SHARED_START {
+                    if shares && way != FROM_THE_ROOT {
                         hybrid::trace::<S, T, Q>(simd, tree, r, h, instance);
                     } else {
                         apart |= 1 << b;
