@@ -1,7 +1,12 @@
 //! Indexed triangle meshes with attributes, and their validation.
 
+mod slices;
+
 use crate::math::Aabb;
 use glam::{DVec3, Vec2, Vec3, Vec4};
+
+pub use slices::MeshSlices;
+pub(crate) use slices::Triangles;
 
 /// Whether an [`Attribute`] has one value per vertex or one per triangle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -95,6 +100,31 @@ pub enum MeshError {
         /// The largest number allowed.
         limit: usize,
     },
+    /// The vertices of [`MeshSlices`] would overlap.
+    #[error("vertices {stride} numbers apart; each has three: give a stride of 3 or more")]
+    Stride {
+        /// Numbers from one vertex to the next.
+        stride: usize,
+    },
+    /// The positions of [`MeshSlices`] end inside a vertex, or before the first.
+    #[error(
+        "{found} numbers of positions do not end with a vertex, of which the first lies at {offset} \
+         and the next {stride} further: give the whole array, or the offset and stride that it has"
+    )]
+    PositionsLength {
+        /// Length of the array.
+        found: usize,
+        /// Numbers from one vertex to the next.
+        stride: usize,
+        /// Numbers before the first vertex.
+        offset: usize,
+    },
+    /// The number of indices of [`MeshSlices`] is no multiple of three.
+    #[error("{found} vertex indices; give three for each triangle")]
+    IndicesLength {
+        /// Number of indices.
+        found: usize,
+    },
 }
 
 /// Faults found by [`TriMesh::validate`]. The build leaves unusable triangles out; the rest is
@@ -117,6 +147,17 @@ impl MeshReport {
     pub fn skipped(&self) -> usize {
         self.index_out_of_range + self.non_finite
     }
+}
+
+/// Whether 32-bit ids can address everything.
+fn check_counts(vertices: usize, triangles: usize) -> Result<(), MeshError> {
+    const LIMIT: usize = (u32::MAX - 1) as usize;
+    for (what, found) in [("vertices", vertices), ("triangles", triangles)] {
+        if found > LIMIT {
+            return Err(MeshError::TooLarge { what, found, limit: LIMIT });
+        }
+    }
+    Ok(())
 }
 
 impl TriMesh {
@@ -142,6 +183,11 @@ impl TriMesh {
             if center.is_finite() && far { center.as_vec3().as_dvec3() } else { DVec3::ZERO };
         let positions = positions.iter().map(|p| (*p - origin).as_vec3()).collect();
         TriMesh { origin, positions, indices, ..Default::default() }
+    }
+
+    /// The triangles, as builders read them.
+    pub(crate) fn triangles(&self) -> Triangles<'_> {
+        MeshSlices::of_mesh(self).triangles()
     }
 
     /// Number of triangles.
@@ -211,12 +257,7 @@ impl TriMesh {
             }
         }
         let (v, f) = (self.positions.len(), self.indices.len());
-        const LIMIT: usize = (u32::MAX - 1) as usize;
-        for (what, found) in [("vertices", v), ("triangles", f)] {
-            if found > LIMIT {
-                return Err(MeshError::TooLarge { what, found, limit: LIMIT });
-            }
-        }
+        check_counts(v, f)?;
         len("normals", &self.normals, v, f)?;
         len("colors", &self.colors, v, f)?;
         len("scalars", &self.scalars, v, f)?;

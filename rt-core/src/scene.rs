@@ -138,6 +138,15 @@ pub enum SceneError {
     /// The world could not be built.
     #[error(transparent)]
     Build(#[from] BuildError),
+    /// A mesh of the world was built from slices, and has nothing to shade.
+    #[error(
+        "geometry {geometry} was built from borrowed slices, of which the world keeps nothing to \
+         shade; build it from a TriMesh for images"
+    )]
+    WithoutArrays {
+        /// Index of the geometry.
+        geometry: usize,
+    },
     /// The numbers of appearances and instances differ.
     #[error("scene has {appearances} appearances for {instances} instances; give one per instance")]
     Appearances {
@@ -207,6 +216,7 @@ impl Scene {
                 Geometry::Mesh(m) => {
                     m.colors.as_ref().map_or_else(ColorSummary::default, ColorSummary::of)
                 }
+                Geometry::Slices(_) => ColorSummary::default(),
                 Geometry::Shape(s) => {
                     ColorSummary { transparent: s.has_transparency(), unusable: None }
                 }
@@ -286,7 +296,7 @@ fn unused(
     let constant = |lacks: &str| format!("{lacks}: its constant colour is used");
     let mesh = match geometry {
         Geometry::Mesh(mesh) => Some(mesh),
-        Geometry::Shape(_) => None,
+        Geometry::Slices(_) | Geometry::Shape(_) => None,
     };
     let by_scalars = matches!(material.color_source, ColorSource::Scalars(_));
     let by_texture = matches!(material.color_source, ColorSource::Texture(_));

@@ -6,7 +6,7 @@
 //! that start near the geometry have small coordinates, and products of three lengths in the
 //! triangle test neither overflow nor underflow.
 
-use super::build::{PrimRef, build_wide};
+use super::build::{PrimRef, Progress, Stopped, build_wide};
 use super::layout::local_frame::LocalFrame;
 use super::layout::triangles::widened;
 use super::layout::wide::{ChildRef, LeafWriter, Unit, WideBvh, write_id_leaf};
@@ -17,7 +17,7 @@ use super::traverse::triangle_leaf::ClosestTri;
 use super::triangle_bvh::{self, TriBvh};
 use crate::bvh::traverse::single::{LeafTest, RaySetup, inflate_t, traverse};
 use crate::math::Aabb;
-use crate::mesh::TriMesh;
+use crate::mesh::Triangles;
 use crate::ray::Ray;
 use crate::shapes::Shape;
 use fearless_simd::Simd;
@@ -72,17 +72,18 @@ pub(crate) fn leaf_primitive_ids(units: &[Unit], leaf: ChildRef) -> &[u32] {
 impl Blas {
     /// `given`: local space and local bounds of the geometry that this is a part of.
     pub(crate) fn for_mesh(
-        mesh: &TriMesh,
+        mesh: Triangles<'_>,
         options: &BuildOptions,
         given: Option<(LocalFrame, Aabb)>,
-    ) -> Blas {
+        progress: &Progress<'_>,
+    ) -> Result<Blas, Stopped> {
         let frame = given
             .map_or_else(|| LocalFrame::choose(mesh.origin, mesh.bounds()), |(frame, _)| frame);
         let whole = given.map(|(_, bounds)| bounds);
-        let mut tris = TriBvh::build(mesh, &frame, 0, options.quality);
+        let mut tris = TriBvh::build(mesh, &frame, 0, options.quality, progress)?;
         let (skipped, notes) = (tris.skipped, std::mem::take(&mut tris.notes));
         let primitives = mesh.indices.len() - skipped;
-        Blas {
+        Ok(Blas {
             frame,
             whole,
             primitives,
@@ -90,29 +91,34 @@ impl Blas {
             cost_growth: 1.0,
             notes,
             content: Content::Triangles(tris),
-        }
+        })
     }
 
     pub(crate) fn for_shape(
         shape: Arc<dyn Shape>,
         options: &BuildOptions,
         given: Option<(LocalFrame, Aabb)>,
-    ) -> Blas {
+        progress: &Progress<'_>,
+    ) -> Result<Blas, Stopped> {
         let n = shape.num_primitives();
         let refs: Vec<PrimRef> = (0..n as u32)
             .into_par_iter()
             .with_min_len(1 << 12)
             .filter_map(|i| {
+                if !progress.goes_on_at(i) {
+                    return None;
+                }
                 let b = shape.bounds(i);
                 (!b.is_empty() && b.min.is_finite() && b.max.is_finite())
                     .then(|| PrimRef::new(widened(b), i))
             })
             .collect();
+        progress.check()?;
         let primitives = refs.len();
         let mut notes = Vec::new();
-        let bvh = build_wide(refs, &IdWriter, options.quality.config(), &mut notes);
+        let bvh = build_wide(refs, &IdWriter, options.quality.config(), &mut notes, progress)?;
         let frame = LocalFrame { center: shape.origin(), scale: 1.0 };
-        Blas {
+        Ok(Blas {
             frame,
             whole: given.map(|(_, bounds)| bounds),
             primitives,
@@ -120,7 +126,7 @@ impl Blas {
             cost_growth: 1.0,
             notes,
             content: Content::Shape { bvh, shape },
-        }
+        })
     }
 
     /// The tree of a shape that has the same primitives, bounds and hits: shared when it is the
@@ -138,7 +144,7 @@ impl Blas {
     /// The part of a group's tree that holds one mesh. `reach`: local bounds of the mesh that this
     /// is a part of.
     pub(crate) fn member(
-        mesh: &TriMesh,
+        mesh: Triangles<'_>,
         frame: LocalFrame,
         reach: Option<Aabb>,
         tree: TriBvh,

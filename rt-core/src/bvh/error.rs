@@ -1,5 +1,6 @@
 //! Why a world cannot be built.
 
+use super::build::Stopped;
 use crate::mesh::MeshError;
 use crate::simd::UnavailableLevel;
 
@@ -49,6 +50,18 @@ pub enum BuildError {
     /// The machine lacks the requested instruction set.
     #[error(transparent)]
     Level(#[from] UnavailableLevel),
+    /// The caller stopped the build: see [`super::World::build_watched`].
+    #[error("the build was stopped by its caller; build again for a world")]
+    Cancelled,
+    /// A geometry that was built from slices is given without them.
+    #[error(
+        "geometry {geometry} was built from borrowed slices, which its world does not keep; give \
+         the slices again to World::from_slices, or build from a TriMesh"
+    )]
+    WithoutArrays {
+        /// Index of the geometry.
+        geometry: usize,
+    },
     /// An instance's transform cannot be inverted.
     #[error(
         "instance {instance}: its transform has determinant {determinant}; give one that is finite \
@@ -60,4 +73,10 @@ pub enum BuildError {
         /// The determinant.
         determinant: f64,
     },
+}
+
+impl From<Stopped> for BuildError {
+    fn from(Stopped: Stopped) -> Self {
+        BuildError::Cancelled
+    }
 }

@@ -29,7 +29,7 @@ mod world;
 pub use all_hits::{HitLists, TooManyHits};
 pub use closest_point::{ClosestPoint, NoDistance};
 pub use error::BuildError;
-pub use geometry::{Geometry, Instance};
+pub use geometry::{Geometry, Instance, SliceFacts};
 pub(crate) use instance_filter::InstanceFilter;
 pub(crate) use layout::wide::Unit;
 pub use options::{BuildOptions, BuildQuality, BuildReport, Robustness, UnknownQuality};

@@ -8,12 +8,13 @@
 //! the hit of the whole world.
 
 use super::blas::Blas;
+use super::build::{Progress, Stopped, UNWATCHED};
 use super::error::BuildError;
-use super::geometry::{Geometry, Instance};
+use super::geometry::{Geometry, Instance, Sources};
 use super::layout::local_frame::LocalFrame;
 use super::mesh_group::GroupLayout;
 use super::options::BuildOptions;
-use super::world::World;
+use super::world::{BuildRequest, World};
 use crate::math::Aabb;
 use glam::{DAffine3, DVec3};
 
@@ -90,14 +91,15 @@ impl World {
         let is_member = |&&i: &&u32| {
             instances.get(i as usize).is_some_and(|instance| {
                 instance.world_from_object == DAffine3::IDENTITY
-                    && matches!(geometries.get(instance.geometry), Some(Geometry::Mesh(_)))
+                    && geometries.get(instance.geometry).is_some_and(Geometry::is_mesh)
             })
         };
         let members = whole.group.iter().flat_map(|g| &g.instances);
         if let Some(&instance) = members.clone().find(|i| !is_member(i)) {
             return Err(BuildError::NotAMember { instance: instance as usize });
         }
-        World::build_in_layout(geometries, instances, options, Some(whole), None)
+        let request = BuildRequest::new(options, &UNWATCHED);
+        BuildRequest { whole: Some(whole), ..request }.build(geometries, instances)
     }
 }
 
@@ -105,13 +107,14 @@ impl World {
 /// whole world.
 pub(super) fn blas_of(
     index: usize,
-    geometry: &Geometry,
+    sources: Sources<'_>,
     options: &BuildOptions,
     whole: Option<&GlobalLayout>,
-) -> Blas {
+    progress: &Progress<'_>,
+) -> Result<Blas, Stopped> {
     let given = whole.map(|w| w.geometries[index]);
-    match geometry {
-        Geometry::Mesh(m) => Blas::for_mesh(m, options, given),
-        Geometry::Shape(s) => Blas::for_shape(s.clone(), options, given),
+    match &sources.geometries[index] {
+        Geometry::Shape(s) => Blas::for_shape(s.clone(), options, given, progress),
+        _ => Blas::for_mesh(sources.triangles(index), options, given, progress),
     }
 }

@@ -6,7 +6,8 @@
 //! built: the report estimates by how much.
 
 use super::blas::{Blas, Content};
-use super::geometry::Geometry;
+use super::build::UNWATCHED;
+use super::geometry::{Geometry, SliceFacts};
 use super::layout::local_frame::LocalFrame;
 use super::layout::triangles::{TRI_LEAF_UNITS, TriWriter, leaf_floats, leaf_triangle_ids};
 use super::layout::wide::{
@@ -14,9 +15,9 @@ use super::layout::wide::{
 };
 use super::mesh_group::{MeshGroup, choose_members};
 use super::top_level::choose_origin;
-use super::world::World;
+use super::world::{BuildRequest, World};
 use crate::math::Aabb;
-use crate::mesh::{MeshError, TriMesh};
+use crate::mesh::{MeshError, MeshSlices, TriMesh, Triangles};
 use rayon::prelude::*;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -90,6 +91,29 @@ pub enum RefitError {
         /// The number in the new mesh.
         found: usize,
     },
+    /// The mesh was built from slices.
+    #[error(
+        "geometry {geometry} was built from borrowed slices, which the world does not keep; give \
+         them to World::refit_slices"
+    )]
+    WithoutArrays {
+        /// The index.
+        geometry: usize,
+    },
+    /// Slices were given for a geometry that was not built from slices.
+    #[error("geometry {geometry} was not built from slices; move its vertices with World::refit")]
+    WithArrays {
+        /// The index.
+        geometry: usize,
+    },
+    /// Slices were not given for every mesh.
+    #[error("slices of {found} meshes for a world of {expected}; give those of all its meshes")]
+    Meshes {
+        /// Geometries of the world.
+        expected: usize,
+        /// Meshes given.
+        found: usize,
+    },
     /// The new mesh has different vertex indices.
     #[error(
         "geometry {geometry}: triangle {triangle} has other vertex indices than when the tree was \
@@ -130,6 +154,7 @@ impl World {
         let old = match self.geometries.get(geometry) {
             None => return Err(RefitError::NoSuchGeometry { geometry, count }),
             Some(Geometry::Shape(_)) => return Err(RefitError::NotAMesh { geometry }),
+            Some(Geometry::Slices(_)) => return Err(RefitError::WithoutArrays { geometry }),
             Some(Geometry::Mesh(_)) if self.blas[geometry].is_part() => {
                 return Err(RefitError::OfAPart { geometry });
             }
@@ -149,16 +174,84 @@ impl World {
             return Err(RefitError::Indices { geometry, triangle: differs.unwrap_or(0) });
         }
 
+        self.geometries[geometry] = Geometry::Mesh(Arc::clone(&mesh));
+        Ok(self.move_vertices(geometry, mesh.triangles(), &[], start))
+    }
+
+    /// As [`World::refit`], for a world from [`World::from_slices`]. `meshes` are all meshes of the
+    /// world, as the build got them but for the vertices of mesh `geometry`, which have moved.
+    /// Nothing of them is copied but the corners in the leaves.
+    ///
+    /// ```
+    /// use rt_core::mesh::MeshSlices;
+    /// use rt_core::prelude::*;
+    ///
+    /// let mut corners = vec![0., 0., 0., 1., 0., 0., 0., 1., 0.];
+    /// let placed = Instance { geometry: 0, world_from_object: DAffine3::IDENTITY };
+    /// let mesh = MeshSlices::new(&corners, &[0, 1, 2]);
+    /// let mut world = World::from_slices(&[mesh], vec![placed], &BuildOptions::default())?;
+    /// for z in [2, 5, 8] {
+    ///     corners[z] += 1.0;
+    /// }
+    /// let report = world.refit_slices(0, &[MeshSlices::new(&corners, &[0, 1, 2])])?;
+    /// assert_eq!(report.unusable, 0);
+    /// let hit = world.closest(&Ray::new(Vec3::new(0.2, 0.2, 3.0), -Vec3::Z)).expect("in the way");
+    /// assert!((hit.t - 2.0).abs() < 1e-6);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`World::refit`]. The world has no old indices to compare the new ones with; with others,
+    /// rays meet the new triangles, but are slower.
+    pub fn refit_slices(
+        &mut self,
+        geometry: usize,
+        meshes: &[MeshSlices<'_>],
+    ) -> Result<RefitReport, RefitError> {
+        let start = Instant::now();
+        let count = self.geometries.len();
+        if geometry >= count {
+            return Err(RefitError::NoSuchGeometry { geometry, count });
+        }
+        if meshes.len() != count {
+            return Err(RefitError::Meshes { expected: count, found: meshes.len() });
+        }
+        for (geometry, (old, mesh)) in self.geometries.iter().zip(meshes).enumerate() {
+            let Geometry::Slices(old) = old else {
+                return Err(RefitError::WithArrays { geometry });
+            };
+            mesh.check().map_err(|source| RefitError::Mesh { geometry, source })?;
+            for (what, expected, found) in [
+                ("vertices", old.num_vertices(), mesh.num_vertices()),
+                ("triangles", old.num_triangles(), mesh.num_triangles()),
+            ] {
+                if expected != found {
+                    return Err(RefitError::Topology { geometry, what, expected, found });
+                }
+            }
+        }
+        let mesh = meshes[geometry].triangles();
+        self.geometries[geometry] = Geometry::Slices(Arc::new(SliceFacts::of_refitted(mesh)));
+        Ok(self.move_vertices(geometry, mesh, meshes, start))
+    }
+
+    /// Moves the vertices of `geometry`, which is the new one already, in the trees.
+    fn move_vertices(
+        &mut self,
+        geometry: usize,
+        mesh: Triangles<'_>,
+        slices: &[MeshSlices<'_>],
+        start: Instant,
+    ) -> RefitReport {
         // Copies a tree that another world also uses.
         let blas = Arc::make_mut(&mut self.blas[geometry]);
         let absent = match &mut self.group {
             Some(group) if blas.bvh().is_none() => {
-                refit_member(Arc::make_mut(group), geometry, blas, &mesh)
+                refit_member(Arc::make_mut(group), geometry, blas, mesh)
             }
-            _ => refit_blas(blas, &mesh),
+            _ => refit_blas(blas, mesh),
         };
         let (unusable, mut cost_growth) = (blas.skipped - absent, blas.cost_growth);
-        self.geometries[geometry] = Geometry::Mesh(mesh);
         let choice = if self.group_is_impossible {
             None
         } else {
@@ -183,16 +276,19 @@ impl World {
         } else {
             // Other meshes share a tree now, or the same ones in another space.
             let (geometries, instances) = (self.geometries.clone(), self.instances.clone());
-            *self = World::build(geometries, instances, &self.options)
+            let options = self.options;
+            let request = BuildRequest::new(&options, &UNWATCHED);
+            *self = BuildRequest { slices, ..request }
+                .build(geometries, instances)
                 .expect("the same transforms, and the new mesh was checked");
             cost_growth = 1.0;
         }
-        Ok(RefitReport { elapsed: start.elapsed(), unusable, absent, cost_growth })
+        RefitReport { elapsed: start.elapsed(), unusable, absent, cost_growth }
     }
 }
 
 /// Moves the vertices in the tree; returns how many usable triangles are not in it.
-fn refit_blas(blas: &mut Blas, mesh: &TriMesh) -> usize {
+fn refit_blas(blas: &mut Blas, mesh: Triangles<'_>) -> usize {
     let Content::Triangles(tris) = &mut blas.content else { return 0 };
     let frame = LocalFrame::choose(mesh.origin, mesh.bounds());
     let writer = TriWriter::new(mesh, &frame, 0);
@@ -204,7 +300,12 @@ fn refit_blas(blas: &mut Blas, mesh: &TriMesh) -> usize {
 }
 
 /// As [`refit_blas`], in the subtree of a group's member.
-fn refit_member(group: &mut MeshGroup, geometry: usize, blas: &mut Blas, mesh: &TriMesh) -> usize {
+fn refit_member(
+    group: &mut MeshGroup,
+    geometry: usize,
+    blas: &mut Blas,
+    mesh: Triangles<'_>,
+) -> usize {
     let Some(member) = group.members.iter().find(|m| m.geometry == geometry).cloned() else {
         return 0;
     };
@@ -222,7 +323,7 @@ fn refit_member(group: &mut MeshGroup, geometry: usize, blas: &mut Blas, mesh: &
 
 /// Updates the counts and the cost of a mesh whose tree had the bounds `before`; returns how many
 /// usable triangles are not in the tree.
-fn record_refit(blas: &mut Blas, mesh: &TriMesh, before: Aabb, root: &RefitTotals) -> usize {
+fn record_refit(blas: &mut Blas, mesh: Triangles<'_>, before: Aabb, root: &RefitTotals) -> usize {
     // Both sums are relative to the area of the whole: their quotient is the ratio of expected
     // tests per ray.
     let (before, after) = (before.half_area() as f64, root.bounds.half_area() as f64);

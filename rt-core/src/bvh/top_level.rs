@@ -1,7 +1,7 @@
 //! The upper level of a world: where the instances are in render space, and a tree over them.
 
 use super::blas::{Blas, IdWriter};
-use super::build::{PrimRef, build_wide};
+use super::build::{PrimRef, Progress, build_wide};
 use super::error::BuildError;
 use super::geometry::Instance;
 use super::layout::wide::WideBvh;
@@ -34,6 +34,7 @@ pub(super) fn build_top_level(
     group: Option<&MeshGroup>,
     origin: DVec3,
     notes: &mut Vec<String>,
+    progress: &Progress<'_>,
 ) -> Result<TopLevel, BuildError> {
     let place_one = |(i, inst): (usize, &Instance)| {
         let b = &blas[inst.geometry];
@@ -68,7 +69,7 @@ pub(super) fn build_top_level(
     } else {
         Vec::new()
     };
-    let tlas = build_wide(refs, &IdWriter, BuildQuality::Balanced.config(), notes);
+    let tlas = build_wide(refs, &IdWriter, BuildQuality::Balanced.config(), notes, progress)?;
     Ok(TopLevel { placements, tlas, only, few })
 }
 

@@ -1,6 +1,6 @@
 //! The hierarchy over a mesh's triangles.
 
-use super::build::{MAX_PRIMS, PrimRef, build_wide};
+use super::build::{MAX_PRIMS, PrimRef, Progress, Stopped, build_wide};
 use super::layout::local_frame::LocalFrame;
 use super::layout::triangles::TriWriter;
 use super::layout::wide::WideBvh;
@@ -9,7 +9,8 @@ use super::query::TriangleTest;
 use super::traverse::single::{RaySetup, traverse_body};
 use super::traverse::tree_view::TreeView;
 use super::traverse::triangle_leaf::{AnyLeaf, ClosestLeaf, ClosestTri};
-use crate::mesh::TriMesh;
+use crate::math::Aabb;
+use crate::mesh::Triangles;
 use crate::ray::Ray;
 use fearless_simd::Simd;
 use rayon::prelude::*;
@@ -25,11 +26,12 @@ pub(crate) struct TriBvh {
 impl TriBvh {
     /// Triangle `i` of the mesh gets the number `first + i`.
     pub(crate) fn build(
-        mesh: &TriMesh,
+        mesh: Triangles<'_>,
         frame: &LocalFrame,
         first: u32,
         quality: BuildQuality,
-    ) -> TriBvh {
+        progress: &Progress<'_>,
+    ) -> Result<TriBvh, Stopped> {
         debug_assert!(mesh.indices.len() < MAX_PRIMS, "checked by the caller");
         let writer = TriWriter::new(mesh, frame, first);
         // Nearly always every triangle is usable: collect in place and remove the few others
@@ -37,12 +39,17 @@ impl TriBvh {
         let mut refs: Vec<PrimRef> = (0..mesh.indices.len() as u32)
             .into_par_iter()
             .with_min_len(1 << 14)
-            .map(|i| PrimRef::new(writer.bounds(i), i))
+            .map(|i| {
+                let goes_on = progress.goes_on_at(i);
+                PrimRef::new(if goes_on { writer.bounds(i) } else { Aabb::EMPTY }, i)
+            })
             .collect();
+        progress.check()?;
         refs.retain(|r| !r.is_empty());
         let skipped = mesh.indices.len() - refs.len();
         let mut notes = Vec::new();
-        TriBvh { bvh: build_wide(refs, &writer, quality.config(), &mut notes), skipped, notes }
+        let bvh = build_wide(refs, &writer, quality.config(), &mut notes, progress)?;
+        Ok(TriBvh { bvh, skipped, notes })
     }
 }
 

@@ -2,7 +2,10 @@
 
 use super::blas::{Blas, Content, leaf_primitive_ids};
 use super::geometry::Geometry;
-use super::layout::triangles::{TRI_LEAF_UNITS, TriWriter, leaf_floats, leaf_triangle_ids};
+use super::layout::local_frame::LocalFrame;
+use super::layout::triangles::{
+    TRI_LEAF_UNITS, TriWriter, leaf_floats, leaf_triangle_ids, row, widened,
+};
 use super::layout::wide::{
     CHILD_ROW, ChildRef, MAX_DEPTH, NODE_UNITS, Unit, WIDTH, WideBvh, get_box,
 };
@@ -11,6 +14,7 @@ use super::traverse::tree_view::NO_OWNER;
 use super::world::World;
 use crate::math::Aabb;
 use crate::mesh::TriMesh;
+use glam::Vec3;
 
 /// Counts of [`World::validate`] over all geometries' trees.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -80,15 +84,16 @@ impl TreeStats {
 
 fn validate_blas(blas: &Blas, geometry: &Geometry) -> Result<TreeStats, String> {
     let stats = match (&blas.content, geometry) {
-        (Content::Triangles(tris), Geometry::Mesh(mesh)) => {
-            let writer = TriWriter::new(mesh, &blas.frame, 0);
-            let mut seen = vec![false; mesh.indices.len()];
+        (Content::Triangles(tris), Geometry::Mesh(_) | Geometry::Slices(_)) => {
+            let corners = Corners::of(geometry, &blas.frame, 0);
+            let mut seen = vec![false; geometry.num_primitives()];
             let stats = TreeWalker::new(&tris.bvh, TRI_LEAF_UNITS).run(|leaf| {
                 let ids = &leaf_triangle_ids(leaf_floats(&tris.bvh.units, leaf))[..leaf.count()];
                 mark(&mut seen, ids)?;
-                Ok(ids.iter().map(|&i| writer.bounds(i)).collect())
+                let units = &tris.bvh.units;
+                Ok((0..ids.len()).map(|k| corners.bounds(units, leaf, k)).collect())
             })?;
-            let lost = (0..seen.len()).find(|&i| !seen[i] && mesh.is_renderable(i));
+            let lost = (0..seen.len()).find(|&i| !seen[i] && corners.is_renderable(i));
             // A refit can make a triangle usable that the build left out; it counts as skipped.
             if let Some(i) = lost
                 && blas.skipped == 0
@@ -106,7 +111,9 @@ fn validate_blas(blas: &Blas, geometry: &Geometry) -> Result<TreeStats, String> 
             })?
         }
         // Checked with its group.
-        (Content::Member { .. }, Geometry::Mesh(_)) => return Ok(TreeStats::default()),
+        (Content::Member { .. }, Geometry::Mesh(_) | Geometry::Slices(_)) => {
+            return Ok(TreeStats::default());
+        }
         (Content::Triangles(_) | Content::Member { .. }, Geometry::Shape(_)) => {
             return Err("a tree of triangles for a shape".into());
         }
@@ -131,18 +138,62 @@ fn mark(seen: &mut [bool], ids: &[u32]) -> Result<(), String> {
     Ok(())
 }
 
+/// Where the corners of a leaf's triangles are known from.
+enum Corners<'a> {
+    /// The mesh.
+    Mesh(TriWriter<'a>, &'a TriMesh),
+    /// Only the leaves: the mesh was built from slices.
+    Leaves,
+}
+
+impl<'a> Corners<'a> {
+    /// `first`: number of the mesh's first triangle in leaves.
+    fn of(geometry: &'a Geometry, frame: &'a LocalFrame, first: u32) -> Self {
+        match geometry {
+            Geometry::Mesh(mesh) => {
+                Corners::Mesh(TriWriter::new(mesh.triangles(), frame, first), mesh)
+            }
+            Geometry::Slices(_) | Geometry::Shape(_) => Corners::Leaves,
+        }
+    }
+
+    /// The box of the triangle in `slot` of a leaf.
+    fn bounds(&self, units: &[Unit], leaf: ChildRef, slot: usize) -> Aabb {
+        let floats = leaf_floats(units, leaf);
+        match self {
+            Corners::Mesh(writer, _) => {
+                writer.bounds(writer.in_mesh(leaf_triangle_ids(floats))[slot])
+            }
+            Corners::Leaves => {
+                let corner = |vertex: usize| Vec3::from_array(corner_of(floats, slot, vertex));
+                let corners = [0, 1, 2].map(corner);
+                // Points stand for triangles that a refit made invalid.
+                let is_point = corners == [Vec3::ZERO; 3];
+                if is_point { Aabb::EMPTY } else { widened(Aabb::from_points(&corners)) }
+            }
+        }
+    }
+
+    fn is_renderable(&self, triangle: usize) -> bool {
+        match self {
+            Corners::Mesh(_, mesh) => mesh.is_renderable(triangle),
+            Corners::Leaves => false,
+        }
+    }
+}
+
+fn corner_of(floats: &[f32; 8 * TRI_LEAF_UNITS], slot: usize, vertex: usize) -> [f32; 3] {
+    [0, 1, 2].map(|axis| row(floats, 3 * vertex + axis)[slot])
+}
+
 /// Checks the tree of a mesh group: as any tree, and that the children of the upper part belong to
 /// whom they say.
 fn validate_group(group: &MeshGroup, geometries: &[Geometry]) -> Result<TreeStats, String> {
-    let meshes: Vec<&TriMesh> = group
-        .members
-        .iter()
-        .map(|m| match &geometries[m.geometry] {
-            Geometry::Mesh(mesh) => Ok(&**mesh),
-            Geometry::Shape(_) => Err(format!("geometry {} is no mesh", m.geometry)),
-        })
-        .collect::<Result<_, _>>()?;
-    let all: usize = meshes.iter().map(|m| m.indices.len()).sum();
+    let shape = group.members.iter().find(|m| !geometries[m.geometry].is_mesh());
+    if let Some(member) = shape {
+        return Err(format!("geometry {} is no mesh", member.geometry));
+    }
+    let all: usize = group.members.iter().map(|m| geometries[m.geometry].num_primitives()).sum();
     let mut seen = vec![false; all];
     let units = &group.bvh.units;
     let walker = TreeWalker {
@@ -153,7 +204,8 @@ fn validate_group(group: &MeshGroup, geometries: &[Geometry]) -> Result<TreeStat
         let ids = &leaf_triangle_ids(leaf_floats(units, leaf))[..leaf.count()];
         mark(&mut seen, ids)?;
         ids.iter()
-            .map(|&id| {
+            .enumerate()
+            .map(|(slot, &id)| {
                 let (instance, prim) = group.owner(id);
                 let k = group.members.iter().position(|m| m.instance == instance);
                 let k = k.ok_or_else(|| format!("triangle {id} has no member"))?;
@@ -161,7 +213,8 @@ fn validate_group(group: &MeshGroup, geometries: &[Geometry]) -> Result<TreeStat
                 if first + prim != id {
                     return Err(format!("triangle {id} is not number {prim} from {first}"));
                 }
-                Ok(TriWriter::new(meshes[k], &group.frame, first).bounds(prim))
+                let geometry = &geometries[group.members[k].geometry];
+                Ok(Corners::of(geometry, &group.frame, first).bounds(units, leaf, slot))
             })
             .collect()
     })?;

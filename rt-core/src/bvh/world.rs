@@ -1,31 +1,27 @@
 //! The two-level acceleration structure for tracing rays: instances of geometries.
 
+mod build;
+
 use super::blas::{Blas, leaf_primitive_ids};
-use super::build::build_in_parallel;
+use super::build::UNWATCHED;
 use super::entry::Entry;
-use super::error::BuildError;
 use super::geometry::{Geometry, Instance};
 use super::instance_filter::InstanceFilter;
 use super::layout::wide::{ChildRef, Unit, WideBvh};
-use super::mesh_group::{
-    GroupChoice, GroupInput, KnownTree, KnownTrees, MeshGroup, build_group, choose_members,
-};
+use super::mesh_group::MeshGroup;
 use super::options::{BuildOptions, BuildReport, Robustness};
-use super::partition::{GlobalLayout, blas_of};
 use super::placement::{ORDINARY_LENGTHS, Placement, distance_to_sphere};
 use super::query::{AnyHit, ClosestHit, FastTest, TriangleTest, WatertightTest};
-use super::top_level::{TopLevel, build_top_level, choose_origin};
+use super::top_level::{TopLevel, build_top_level};
 use crate::bvh::traverse::single::{LeafTest, RaySetup, inflate_t, traverse};
 use crate::bvh::traverse::tree_view::TreeView;
 use crate::math::{Aabb, exp2i, max_abs};
-use crate::mesh::TriMesh;
 use crate::ray::{Hit, Ray};
-use crate::simd::SimdLevel;
+pub(in crate::bvh) use build::BuildRequest;
 use fearless_simd::{Level, Simd, dispatch};
-use glam::{DAffine3, DVec3, Vec3};
+use glam::{DVec3, Vec3};
 use std::marker::PhantomData;
 use std::sync::Arc;
-use std::time::Instant;
 
 /// Instances of geometries with their acceleration structures.
 pub struct World {
@@ -53,169 +49,11 @@ pub struct World {
 }
 
 impl World {
-    /// Builds the acceleration structures.
-    pub fn build(
-        geometries: Vec<Geometry>,
-        instances: Vec<Instance>,
-        options: &BuildOptions,
-    ) -> Result<World, BuildError> {
-        World::build_sharing(geometries, instances, options, None)
-    }
-
-    /// As [`World::build`], but reuses the acceleration structure of every geometry that `previous`
-    /// also has (the same [`Arc`], at any index). When one of five hundred meshes changes, the
-    /// trees of the others are copied, which takes a small part of the time of building them. When
-    /// only transforms change, nothing is copied. If the options differ from those of `previous`,
-    /// everything is rebuilt. The hits equal those of a world built from scratch (after a
-    /// [`World::refit`] of `previous`: those of the refitted world).
-    pub fn build_sharing(
-        geometries: Vec<Geometry>,
-        instances: Vec<Instance>,
-        options: &BuildOptions,
-        previous: Option<&World>,
-    ) -> Result<World, BuildError> {
-        World::build_in_layout(geometries, instances, options, None, previous)
-    }
-
-    /// Builds a world, or a part of one. Reuses the structures of `previous` for geometries that
-    /// both have.
-    pub(super) fn build_in_layout(
-        geometries: Vec<Geometry>,
-        instances: Vec<Instance>,
-        options: &BuildOptions,
-        whole: Option<&GlobalLayout>,
-        previous: Option<&World>,
-    ) -> Result<World, BuildError> {
-        let start = Instant::now();
-        let mut phases = Vec::new();
-        let level = SimdLevel::resolve(options.simd)?;
-        for (i, inst) in instances.iter().enumerate() {
-            if inst.geometry >= geometries.len() {
-                let count = geometries.len();
-                return Err(BuildError::NoSuchGeometry {
-                    instance: i,
-                    geometry: inst.geometry,
-                    count,
-                });
-            }
-        }
-        for (i, g) in geometries.iter().enumerate() {
-            g.check(i)?;
-        }
-        let previous = previous.filter(|w| w.options == *options);
-        let known = previous.map(World::trees_by_address);
-        let earlier = previous.and_then(|w| w.group.as_ref());
-        let choice = match whole {
-            None => choose_members(&geometries, &instances),
-            Some(whole) => whole.group.as_ref().map(GroupChoice::of_layout),
-        };
-
-        // ---- Geometries with a tree of their own.
-        let build_alone = |i: usize| {
-            let g = &geometries[i];
-            match (known.as_ref().and_then(|k| k.get(&g.address())), g) {
-                (Some(old), Geometry::Mesh(_)) if old.blas.bvh().is_some() => Arc::clone(old.blas),
-                (Some(old), Geometry::Shape(s)) => Blas::with_shape(old.blas, s),
-                _ => Arc::new(blas_of(i, g, options, whole)),
-            }
-        };
-        let mut blas: Vec<Option<Arc<Blas>>> = vec![None; geometries.len()];
-        let members = choice.iter().flat_map(|c| &c.instances);
-        let members: Vec<usize> = members.map(|&i| instances[i as usize].geometry).collect();
-        build_missing(&geometries, &mut blas, &members, build_alone);
-
-        // ---- The meshes that share one tree, in render space.
-        let origin = whole.map_or_else(
-            || choose_origin(&instances, &blas, choice.as_ref()),
-            |whole| whole.origin,
-        );
-        let mut notes = Vec::new();
-        let layout = whole.and_then(|whole| whole.group.as_ref());
-        let group = choice.as_ref().and_then(|choice| {
-            let input = GroupInput {
-                geometries: &geometries,
-                instances: &instances,
-                members: &choice.instances,
-                frame: layout.map_or_else(|| choice.frame(origin), |l| l.frame),
-                origin,
-                reach: layout.map(|l| l.reach),
-                options,
-            };
-            build_group(&input, known.as_ref(), earlier, &mut notes)
-        });
-        let group = group.map(|(group, of_members)| {
-            for (&geometry, b) in members.iter().zip(of_members) {
-                blas[geometry] = Some(b);
-            }
-            group
-        });
-        // Without a group, its members get trees of their own.
-        build_missing(&geometries, &mut blas, &[], build_alone);
-        let blas: Vec<Arc<Blas>> = blas.into_iter().flatten().collect();
-        phases.push(("geometries", start.elapsed()));
-
-        let of_geometry = |(i, b): (usize, &Arc<Blas>)| {
-            b.notes.iter().map(|n| format!("geometry {i}: {n}")).collect::<Vec<_>>()
-        };
-        notes.extend(blas.iter().enumerate().flat_map(of_geometry));
-        let TopLevel { placements, tlas, only, few } =
-            build_top_level(&instances, &blas, group.as_deref(), origin, &mut notes)?;
-        phases.push(("instances", start.elapsed() - phases[0].1));
-        let group_tree = group.as_ref().map(|g| &g.bvh);
-        let trees = || blas.iter().filter_map(|b| b.bvh()).chain(group_tree);
-        let report = BuildReport {
-            total: start.elapsed(),
-            phases,
-            depth: trees().map(|t| t.depth).max().unwrap_or(0),
-            primitives: blas.iter().map(|b| b.primitives).sum(),
-            skipped: blas.iter().map(|b| b.skipped).sum(),
-            bytes: (tlas.units.len() + trees().map(|t| t.units.len()).sum::<usize>())
-                * size_of::<Unit>(),
-            notes,
-        };
-        Ok(World {
-            geometries,
-            instances,
-            origin,
-            bounds: whole.map_or(tlas.bounds, |w| w.bounds),
-            report,
-            blas,
-            placements,
-            group_is_impossible: choice.is_some() && group.is_none(),
-            group,
-            tlas,
-            only,
-            few,
-            options: *options,
-            robustness: options.robustness,
-            level,
-        })
-    }
-
-    /// A world of one mesh, without a transform.
-    pub fn from_mesh(
-        mesh: impl Into<Arc<TriMesh>>,
-        options: &BuildOptions,
-    ) -> Result<World, BuildError> {
-        let instance = Instance { geometry: 0, world_from_object: DAffine3::IDENTITY };
-        World::build(vec![Geometry::Mesh(mesh.into())], vec![instance], options)
-    }
-
-    fn trees_by_address(&self) -> KnownTrees<'_> {
-        let mut members = vec![None; self.geometries.len()];
-        for (k, m) in self.group.iter().flat_map(|g| g.members.iter().enumerate()) {
-            members[m.geometry] = Some(k);
-        }
-        let known = |(geometry, blas)| KnownTree { geometry, member: members[geometry], blas };
-        let addresses = self.geometries.iter().map(Geometry::address);
-        addresses.zip(self.blas.iter().enumerate().map(known)).collect()
-    }
-
     /// Rebuilds the upper level after a geometry has changed. Render space may have another origin.
     pub(super) fn rebuild_top_level(&mut self, origin: DVec3) {
         let notes = &mut self.report.notes;
         let group = self.group.as_deref();
-        let placed = build_top_level(&self.instances, &self.blas, group, origin, notes);
+        let placed = build_top_level(&self.instances, &self.blas, group, origin, notes, &UNWATCHED);
         let TopLevel { placements, tlas, only, few } =
             placed.expect("the build accepted these transforms");
         self.report.primitives = self.blas.iter().map(|b| b.primitives).sum();
@@ -426,23 +264,6 @@ pub(super) fn with_ordinary_length(ray: &Ray) -> (Ray, f32) {
         },
         k,
     )
-}
-
-/// Builds the structures that are missing in `blas`, but for those of the geometries in `except`.
-fn build_missing(
-    geometries: &[Geometry],
-    blas: &mut [Option<Arc<Blas>>],
-    except: &[usize],
-    build: impl Fn(usize) -> Arc<Blas> + Sync,
-) {
-    let mut wanted: Vec<bool> = blas.iter().map(Option::is_none).collect();
-    except.iter().for_each(|&i| wanted[i] = false);
-    let missing: Vec<usize> = (0..blas.len()).filter(|&i| wanted[i]).collect();
-    let sizes: Vec<usize> = missing.iter().map(|&i| geometries[i].num_primitives()).collect();
-    let built = build_in_parallel(&sizes, |k| build(missing[k]));
-    for (i, b) in missing.into_iter().zip(built) {
-        blas[i] = Some(b);
-    }
 }
 
 struct InstanceClosest<'w, T: TriangleTest> {

@@ -23,6 +23,10 @@ impl Scene {
         if expected != found {
             return Err(SceneError::OtherWorld { expected, found });
         }
+        let slices = |g: &Geometry| matches!(g, Geometry::Slices(_));
+        if let Some(geometry) = self.world.geometries().iter().position(slices) {
+            return Err(SceneError::WithoutArrays { geometry });
+        }
         self.check_surroundings()?;
         for (index, m) in self.materials.iter().enumerate() {
             m.check().map_err(|(field, value, rule)| SceneError::OutOfRange {

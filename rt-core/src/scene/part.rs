@@ -30,6 +30,9 @@ impl Scene {
                     vertices_kept.push(vertices);
                     Geometry::Mesh(Arc::new(part))
                 }
+                Geometry::Slices(_) => {
+                    return Err(SceneError::WithoutArrays { geometry: geometries.len() });
+                }
                 Geometry::Shape(shape) => {
                     vertices_kept.push(Vec::new());
                     Geometry::Shape(

@@ -137,6 +137,7 @@ impl<'a> ResolvedInstance<'a> {
                 appearance.colors().or(m.colors.as_ref()),
                 appearance.scalars().or(m.scalars.as_ref()),
             ),
+            Geometry::Slices(_) => unreachable!("Scene::check refuses them"),
             Geometry::Shape(s) => {
                 (Source::Shape(&**s), s.origin(), appearance.colors(), appearance.scalars())
             }

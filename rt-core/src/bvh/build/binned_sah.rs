@@ -3,6 +3,7 @@
 //! primitives costing one test.
 
 use super::prim_ref::{Box4, PrimRef, SetBounds};
+use super::progress::{PRIMITIVES_BETWEEN_CHECKS, Progress};
 use fearless_simd::{Level, Simd, dispatch};
 use glam::Vec4;
 use rayon::prelude::*;
@@ -12,7 +13,7 @@ use std::ops::Range;
 const MAX_BINS: usize = 16;
 /// Sets at least this large are binned in parallel, in chunks of this size (fixed, so that the tree
 /// does not depend on the threads).
-const PARALLEL_CHUNK: usize = 1 << 16;
+const PARALLEL_CHUNK: usize = PRIMITIVES_BETWEEN_CHECKS;
 
 /// Sets at least this large fill two sets of bins in turn: neighbours often fall into the same bin,
 /// and the second would wait for what the first has just stored (6 % of a build).
@@ -280,10 +281,13 @@ fn find_plane(
     bounds: &SetBounds,
     sah: SahConfig,
     space: &mut SearchSpace,
+    progress: &Progress<'_>,
 ) -> Option<SplitPlane> {
     if refs.len() >= 2 * PARALLEL_CHUNK {
         let level = space.level;
-        return dispatch!(level, simd => find_plane_of_many(simd, refs, bounds, sah, level));
+        return dispatch!(level, simd => {
+            find_plane_of_many(simd, refs, bounds, sah, level, progress)
+        });
     }
     dispatch!(space.level, simd => find_plane_of_few(simd, refs, bounds, sah, space))
 }
@@ -326,25 +330,31 @@ fn find_plane_of_many<S: Simd>(
     bounds: &SetBounds,
     sah: SahConfig,
     level: Level,
+    progress: &Progress<'_>,
 ) -> Option<SplitPlane> {
     let (map, bins, axes) = search(refs.len(), bounds, sah);
     let fill = |chunk| {
         let mut space = SearchSpace::new(level);
-        simd.vectorize(
-            #[inline(always)]
-            || space.fill(simd, chunk, &map, bins, axes.clone()),
-        );
+        if progress.check().is_ok() {
+            simd.vectorize(
+                #[inline(always)]
+                || space.fill(simd, chunk, &map, bins, axes.clone()),
+            );
+        }
         space
     };
     let all = refs.par_chunks(PARALLEL_CHUNK).map(fill).reduce_with(|mut a, b| {
         a.even.add_bins(simd, &b.even, bins, axes.clone());
         a
     })?;
+    if progress.is_stopped() {
+        return None;
+    }
     all.even.best_plane(simd, map, bins, axes, sah.leaves)
 }
 
 /// Cuts `from` (at least two) at the best place: the two sides are the parts of `to`, which is as
-/// long. `None` when no cut separates the primitives.
+/// long. `None` when no cut separates the primitives, or when the build was stopped.
 ///
 /// Every primitive is written to both ends and only one end moves on: no branch depends on the
 /// data, which a processor would often guess wrong.
@@ -354,17 +364,23 @@ pub(crate) fn split_into<'a>(
     bounds: &SetBounds,
     sah: SahConfig,
     space: &mut SearchSpace,
+    progress: &Progress<'_>,
 ) -> Option<Split<'a>> {
-    let plane = find_plane(from, bounds, sah, space)?;
+    let plane = find_plane(from, bounds, sah, space, progress)?;
     let to = &mut to[..from.len()];
     let mut i = 0;
-    for (done, p) in from.iter().enumerate() {
-        // Places i.. and ..=from the other end are free; together they are as many as primitives
-        // are left.
-        let j = from.len() - 1 - (done - i);
-        to[i] = *p;
-        to[j] = *p;
-        i += plane.is_left(p) as usize;
+    for (k, piece) in from.chunks(PARALLEL_CHUNK).enumerate() {
+        if k > 0 && progress.check().is_err() {
+            return None;
+        }
+        for (done, p) in piece.iter().enumerate() {
+            // Places i.. and ..=from the other end are free; together they are as many as
+            // primitives are left.
+            let j = from.len() - 1 - (k * PARALLEL_CHUNK + done - i);
+            to[i] = *p;
+            to[j] = *p;
+            i += plane.is_left(p) as usize;
+        }
     }
     let (left, right) = to.split_at_mut(i);
     let [left_bounds, right_bounds] = [(&*left, 0), (&*right, 1)].map(|(side, k)| {

@@ -4,6 +4,7 @@
 use super::binary_tree::BinaryTree;
 use super::binned_sah::{LeafCapacity, SahConfig, SearchSpace, halve, split_into};
 use super::prim_ref::{Box4, PrimRef, SetBounds};
+use super::progress::UNWATCHED;
 use fearless_simd::{Level, Simd, dispatch};
 use glam::Vec4;
 use std::ops::Range;
@@ -70,8 +71,11 @@ impl SahTree {
             self.build(child + 1, right, spare, &bounds[1], first + at, depth + 1);
             return;
         }
-        let cut =
-            by_cost.then(|| split_into(refs, spare, bounds, self.sah, &mut self.space)).flatten();
+        // A fragment is small enough to be finished.
+        let (sah, progress) = (self.sah, &UNWATCHED);
+        let cut = by_cost
+            .then(|| split_into(refs, spare, bounds, sah, &mut self.space, progress))
+            .flatten();
         // The split moved everything to `spare`. Halves stay in `refs`.
         let (s, spare) = match cut {
             Some(s) => (s, refs),

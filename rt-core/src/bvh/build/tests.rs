@@ -262,7 +262,7 @@ fn what_obvhs_cannot_take_is_built_by_sah_and_noted() {
     refs.sort_unstable_by_key(PrimRef::id);
     let config = BuilderConfig { method: Method::Reinsertion, sah: THOROUGH };
     let mut notes = Vec::new();
-    let bvh = build_wide(refs.clone(), &IdWriter, config, &mut notes);
+    let bvh = build_wide(refs.clone(), &IdWriter, config, &mut notes, &UNWATCHED).unwrap();
     assert_eq!(notes.len(), 1, "{notes:?}");
     assert!(notes[0].contains("surface area heuristic"), "{notes:?}");
     assert!(bvh.units.len() > refs.len() / 4, "{}", bvh.units.len());

@@ -10,6 +10,7 @@ use super::binned_sah::{SahConfig, SearchSpace, Split, halve, split_into};
 use super::collapse::{NO_CHILD, WidePlan, plan};
 use super::obvhs_tree::{MAX_BINARY_DEPTH, reinsert};
 use super::prim_ref::{PrimRef, SetBounds};
+use super::progress::{PRIMITIVES_BETWEEN_CHECKS, Progress, Stopped};
 use super::sah_tree::{MAX_COST_DEPTH, sah_tree};
 use crate::bvh::layout::wide::{
     ChildRef, LeafWriter, MAX_DEPTH, NODE_UNITS, Unit, WIDTH, WideBvh, write_node,
@@ -25,6 +26,8 @@ const MAX_LARGE_CUTS: usize = 20;
 const FRAGMENT_DEPTH: usize = MAX_COST_DEPTH + MAX_FRAGMENT_LOG2 as usize;
 /// Largest size of a fragment, as a power of two.
 const MAX_FRAGMENT_LOG2: u32 = 16;
+
+const _: () = assert!(1 << MAX_FRAGMENT_LOG2 <= PRIMITIVES_BETWEEN_CHECKS);
 
 // Whatever the input, no path is longer than the traversal stack allows: sets of up to 2^30
 // primitives are halved down to fragments of 2^14.
@@ -105,6 +108,16 @@ enum TopNode {
     Fragment(Fragment),
 }
 
+/// How the fragments are built.
+#[derive(Clone, Copy)]
+struct Plan<'p> {
+    config: BuilderConfig,
+    level: Level,
+    progress: &'p Progress<'p>,
+    /// Whether the primitives are those that the caller of the build knows of.
+    counts: bool,
+}
+
 /// Builds a hierarchy over `refs`. Adds a note to `notes` for each part that could not be built as
 /// `config` says.
 pub(crate) fn build_wide<W: LeafWriter>(
@@ -112,18 +125,21 @@ pub(crate) fn build_wide<W: LeafWriter>(
     writer: &W,
     config: BuilderConfig,
     notes: &mut Vec<String>,
-) -> WideBvh {
+    progress: &Progress<'_>,
+) -> Result<WideBvh, Stopped> {
     if refs.is_empty() {
         let mut units = vec![Unit::ZERO; NODE_UNITS];
         write_node(&mut units, &[]);
-        return WideBvh { units, bounds: Aabb::EMPTY, depth: 1 };
+        return Ok(WideBvh { units, bounds: Aabb::EMPTY, depth: 1 });
     }
     let bounds =
         refs.par_chunks(1 << 16).map(SetBounds::of).reduce(|| SetBounds::EMPTY, |a, b| a.union(&b));
+    progress.check()?;
     debug_assert_eq!(config.sah.leaves.size(), W::CAPACITY, "leaves that the writer can hold");
     let level = Level::new();
     let mut spare = refs.clone();
-    let root = collapse_cuts(fragments(&mut refs, &mut spare, &bounds, config, level, 0));
+    let plan = Plan { config, level, progress, counts: W::COUNTS };
+    let root = collapse_cuts(fragments(&mut refs, &mut spare, &bounds, plan, 0)?);
     let (fallbacks, all) = root.fallbacks();
     if fallbacks > 0 {
         notes.push(format!(
@@ -144,8 +160,10 @@ pub(crate) fn build_wide<W: LeafWriter>(
     let depth = root.depth();
     debug_assert!(depth <= MAX_DEPTH, "depth {depth} is bounded by construction");
     let mut units = huge_pages::filled(Unit::ZERO, root.units::<W>());
-    root.write(writer, 0, &mut units);
-    WideBvh { units, bounds: bounds.aabb(), depth }
+    root.write(writer, 0, &mut units, progress);
+    // Stopped, it has left out parts.
+    progress.check()?;
+    Ok(WideBvh { units, bounds: bounds.aabb(), depth })
 }
 
 /// Splits sets down to fragments, both sides of each split in parallel, and plans the fragments.
@@ -154,17 +172,23 @@ fn fragments(
     refs: &mut [PrimRef],
     spare: &mut [PrimRef],
     bounds: &SetBounds,
-    config: BuilderConfig,
-    level: Level,
+    plan: Plan<'_>,
     depth: usize,
-) -> CutTree {
+) -> Result<CutTree, Stopped> {
+    let Plan { config, level, progress, counts } = plan;
+    progress.check()?;
     if refs.len() <= config.fragment() {
-        return CutTree::Fragment(Fragment::new(refs, spare, bounds, config, level));
+        let fragment = Fragment::new(refs, spare, bounds, config, level);
+        progress.advance(if counts { refs.len() } else { 0 })?;
+        return Ok(CutTree::Fragment(fragment));
     }
     let by_cost = depth < MAX_LARGE_CUTS;
     let cut = by_cost
-        .then(|| split_into(refs, spare, bounds, config.sah, &mut SearchSpace::new(level)))
+        .then(|| {
+            split_into(refs, spare, bounds, config.sah, &mut SearchSpace::new(level), progress)
+        })
         .flatten();
+    progress.check()?;
     // The split moved everything to `spare`. Halves stay in `refs`.
     let (Split { left, left_bounds, right, right_bounds }, spare) = match cut {
         Some(s) => (s, refs),
@@ -172,10 +196,10 @@ fn fragments(
     };
     let (spare_left, spare_right) = spare.split_at_mut(left.len());
     let (l, r) = rayon::join(
-        || fragments(left, spare_left, &left_bounds, config, level, depth + 1),
-        || fragments(right, spare_right, &right_bounds, config, level, depth + 1),
+        || fragments(left, spare_left, &left_bounds, plan, depth + 1),
+        || fragments(right, spare_right, &right_bounds, plan, depth + 1),
     );
-    CutTree::Cut(Box::new([l, r]), bounds.aabb())
+    Ok(CutTree::Cut(Box::new([l?, r?]), bounds.aabb()))
 }
 
 /// Collapses the splits above the fragments into wide nodes: repeatedly opens the set with the
@@ -247,9 +271,17 @@ impl TopNode {
         }
     }
 
-    /// Writes this part of the arena, which starts at unit `base`.
-    fn write<W: LeafWriter>(self, writer: &W, base: usize, out: &mut [Unit]) -> ChildRef {
+    /// Writes this part of the arena, which starts at unit `base`; leaves out what is not yet
+    /// written when the build is stopped.
+    fn write<W: LeafWriter>(
+        self,
+        writer: &W,
+        base: usize,
+        out: &mut [Unit],
+        progress: &Progress<'_>,
+    ) -> ChildRef {
         match self {
+            TopNode::Fragment(_) if progress.check().is_err() => ChildRef::NONE,
             TopNode::Fragment(f) => {
                 let mut w =
                     FragmentWriter { fragment: &f, writer, base, out, next_node: 0, next_unit: 0 };
@@ -268,7 +300,7 @@ impl TopNode {
                 }
                 let placed: Vec<(Aabb, ChildRef)> = jobs
                     .into_par_iter()
-                    .map(|(c, base, out)| (c.bounds(), c.write(writer, base, out)))
+                    .map(|(c, base, out)| (c.bounds(), c.write(writer, base, out, progress)))
                     .collect();
                 write_node(node, &placed);
                 ChildRef::node(base)

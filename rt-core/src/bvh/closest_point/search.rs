@@ -147,6 +147,7 @@ impl Search<'_> {
         let geometry = self.world.instances()[instance as usize].geometry;
         match &self.world.geometries()[geometry] {
             Geometry::Mesh(mesh) => mesh.is_renderable(prim as usize),
+            Geometry::Slices(facts) => facts.is_present(prim),
             Geometry::Shape(_) => false,
         }
     }

@@ -3,7 +3,7 @@
 use super::local_frame::LocalFrame;
 use super::wide::{ChildRef, LEAF_SIZE, LeafWriter, Unit};
 use crate::math::Aabb;
-use crate::mesh::TriMesh;
+use crate::mesh::Triangles;
 use glam::Vec3;
 
 /// Units of a leaf: nine rows of four floats (x, y, z of the first, second and third vertices) and
@@ -33,7 +33,7 @@ pub(crate) fn leaf_triangle_ids(leaf: &[f32; 8 * TRI_LEAF_UNITS]) -> [u32; 4] {
 
 /// Writes a mesh's triangles into leaves.
 pub(crate) struct TriWriter<'m> {
-    mesh: &'m TriMesh,
+    mesh: Triangles<'m>,
     frame: &'m LocalFrame,
     /// Positions are stored unchanged.
     plain: bool,
@@ -43,7 +43,7 @@ pub(crate) struct TriWriter<'m> {
 
 impl<'m> TriWriter<'m> {
     /// Triangle `i` of the mesh has the number `first + i` in leaves.
-    pub(crate) fn new(mesh: &'m TriMesh, frame: &'m LocalFrame, first: u32) -> Self {
+    pub(crate) fn new(mesh: Triangles<'m>, frame: &'m LocalFrame, first: u32) -> Self {
         let plain = frame.center == mesh.origin && frame.scale == 1.0;
         TriWriter { mesh, frame, plain, first }
     }
@@ -52,9 +52,7 @@ impl<'m> TriWriter<'m> {
 impl TriWriter<'_> {
     #[inline(always)]
     fn triangle(&self, i: u32) -> [Vec3; 3] {
-        let [a, b, c] = self.mesh.indices[i as usize];
-        let p = &self.mesh.positions;
-        let corners = [p[a as usize], p[b as usize], p[c as usize]];
+        let corners = self.mesh.corners(i);
         if self.plain { corners } else { corners.map(|p| self.frame.local(self.mesh.origin, p)) }
     }
 }

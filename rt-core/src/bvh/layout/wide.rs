@@ -157,6 +157,9 @@ pub(crate) trait LeafWriter: Sync {
     const UNITS: usize;
     /// Largest number of primitives of a leaf.
     const CAPACITY: usize = LEAF_SIZE;
+    /// Whether these are primitives or instances of the world, which the progress of a build
+    /// counts, or parts of its trees.
+    const COUNTS: bool = true;
     /// Writes up to four primitives into a leaf's units.
     fn write(&self, prims: &[u32], out: &mut [Unit]);
     /// The reference that the leaf's parent holds. The leaf starts at `unit`.

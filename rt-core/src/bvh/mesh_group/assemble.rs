@@ -3,7 +3,7 @@
 use super::Member;
 use super::subtree::Subtree;
 use super::upper::{Upper, build_upper, link};
-use crate::bvh::build::{BuilderConfig, MAX_PRIMS};
+use crate::bvh::build::{BuilderConfig, MAX_PRIMS, Progress, Stopped};
 use crate::bvh::layout::triangles::TRI_LEAF_UNITS;
 use crate::bvh::layout::wide::{CHILD_ROW, ChildRef, MAX_DEPTH, NODE_UNITS, Unit, WideBvh};
 use crate::bvh::traverse::tree_view::ChildOwners;
@@ -19,23 +19,24 @@ pub(in crate::bvh) struct GroupTree {
     pub(super) triangles: u32,
 }
 
-/// Joins the subtrees, which are in the order of their instances. `None` when the result would be
-/// deeper than a traversal stack allows or larger than child references reach.
+/// Joins the subtrees, which are in the order of their instances. `Ok(None)` when the result would
+/// be deeper than a traversal stack allows or larger than child references reach.
 pub(in crate::bvh) fn assemble(
     subtrees: Vec<Subtree<'_>>,
     config: BuilderConfig,
     notes: &mut Vec<String>,
-) -> Option<GroupTree> {
+    progress: &Progress<'_>,
+) -> Result<Option<GroupTree>, Stopped> {
     let triangles: usize = subtrees.iter().map(|s| s.triangles as usize).sum();
     let units: usize = subtrees.iter().map(|s| s.units.len()).sum();
     if triangles >= MAX_PRIMS {
-        return None;
+        return Ok(None);
     }
 
-    let Upper { tree: upper, opened, replaced } = build_upper(&subtrees, config, notes);
+    let Upper { tree: upper, opened, replaced } = build_upper(&subtrees, config, notes, progress)?;
     let depth = upper.depth + subtrees.iter().map(|s| s.depth).max().unwrap_or(0);
     if depth > MAX_DEPTH || upper.units.len() + units > ChildRef::MAX_UNITS {
-        return None;
+        return Ok(None);
     }
 
     // ---- The array: upper part, then the subtrees.
@@ -65,7 +66,8 @@ pub(in crate::bvh) fn assemble(
     });
     let bvh = WideBvh { units: arena, bounds: upper.bounds, depth };
     let replaced_units = replaced * NODE_UNITS;
-    Some(GroupTree { bvh, owners, members, replaced_units, triangles: triangles as u32 })
+    let triangles = triangles as u32;
+    Ok(Some(GroupTree { bvh, owners, members, replaced_units, triangles }))
 }
 
 /// What is added to the references and to the triangle numbers of a subtree when it moves. Sums

@@ -3,8 +3,8 @@
 use super::subtree::Subtree;
 use super::{Member, MeshGroup, assemble};
 use crate::bvh::blas::{Blas, Content};
-use crate::bvh::build::build_in_parallel;
-use crate::bvh::geometry::{Geometry, Instance};
+use crate::bvh::build::{Progress, Stopped, build_in_parallel};
+use crate::bvh::geometry::{Instance, Sources};
 use crate::bvh::layout::local_frame::LocalFrame;
 use crate::bvh::layout::wide::WideBvh;
 use crate::bvh::options::BuildOptions;
@@ -17,7 +17,7 @@ use std::sync::Arc;
 
 /// What a group is built from.
 pub(in crate::bvh) struct GroupInput<'a> {
-    pub(in crate::bvh) geometries: &'a [Geometry],
+    pub(in crate::bvh) sources: Sources<'a>,
     pub(in crate::bvh) instances: &'a [Instance],
     /// Instances of the members, ascending.
     pub(in crate::bvh) members: &'a [u32],
@@ -27,6 +27,7 @@ pub(in crate::bvh) struct GroupInput<'a> {
     /// Bounds of the group that this is a part of.
     pub(in crate::bvh) reach: Option<Aabb>,
     pub(in crate::bvh) options: &'a BuildOptions,
+    pub(in crate::bvh) progress: &'a Progress<'a>,
 }
 
 /// A geometry of an earlier world: its index there, its index among the members of the group
@@ -50,54 +51,57 @@ enum Source<'w> {
     Member(&'w MeshGroup, usize),
 }
 
-/// The group, and the structure of each member. `None` when the tree would be too large or too
+/// A group, and the structure of each member.
+type BuiltGroup = (Arc<MeshGroup>, Vec<Arc<Blas>>);
+
+/// The group, and the structure of each member. `Ok(None)` when the tree would be too large or too
 /// deep.
 pub(in crate::bvh) fn build_group(
     input: &GroupInput<'_>,
     known: Option<&KnownTrees<'_>>,
     previous: Option<&Arc<MeshGroup>>,
     notes: &mut Vec<String>,
-) -> Option<(Arc<MeshGroup>, Vec<Arc<Blas>>)> {
+) -> Result<Option<BuiltGroup>, Stopped> {
     if let (Some(known), Some(group)) = (known, previous)
         && let Some(unchanged) = unchanged_group(input, known, group)
     {
-        return Some(unchanged);
+        return Ok(Some(unchanged));
     }
     let geometry_of = |k: usize| input.instances[input.members[k] as usize].geometry;
-    let mesh_of = |k: usize| match &input.geometries[geometry_of(k)] {
-        Geometry::Mesh(mesh) => mesh,
-        Geometry::Shape(_) => unreachable!("only meshes are members"),
-    };
+    let address_of = |geometry: usize| input.sources.geometries[geometry].address();
+    let size_of = |k: usize| input.sources.geometries[geometry_of(k)].num_primitives();
     let mut first = 0usize;
     let firsts: Vec<u32> = (0..input.members.len())
         .map(|k| {
             let at = first;
-            first += mesh_of(k).indices.len();
+            first += size_of(k);
             at as u32
         })
         .collect();
     if u32::try_from(first).is_err() {
-        return None;
+        return Ok(None);
     }
 
     let build = |k: usize| {
-        let mesh = mesh_of(k);
-        if let Some(old) =
-            known.and_then(|trees| trees.get(&input.geometries[geometry_of(k)].address()))
+        if let Some(old) = known.and_then(|trees| trees.get(&address_of(geometry_of(k))))
             && old.blas.frame == input.frame
             && let Some(source) = source_of(old, previous)
         {
-            return (Arc::clone(old.blas), source);
+            input.progress.advance(size_of(k))?;
+            return Ok((Arc::clone(old.blas), source));
         }
-        let tree = TriBvh::build(mesh, &input.frame, firsts[k], input.options.quality);
+        let mesh = input.sources.triangles(geometry_of(k));
+        let tree =
+            TriBvh::build(mesh, &input.frame, firsts[k], input.options.quality, input.progress)?;
         let (blas, bvh) = Blas::member(mesh, input.frame, input.reach, tree);
-        (Arc::new(blas), Source::Built(bvh))
+        Ok((Arc::new(blas), Source::Built(bvh)))
     };
-    let sizes: Vec<usize> = (0..input.members.len()).map(|k| mesh_of(k).indices.len()).collect();
+    let sizes: Vec<usize> = (0..input.members.len()).map(size_of).collect();
     let built = build_in_parallel(&sizes, build);
 
     let (mut members, mut subtrees) = (Vec::new(), Vec::new());
-    for (k, (blas, source)) in built.into_iter().enumerate() {
+    for (k, built) in built.into_iter().enumerate() {
+        let (blas, source) = built?;
         let depth = blas.depth();
         let (units, base, first) = match source {
             Source::Built(bvh) => (Cow::Owned(bvh.units), 0, firsts[k]),
@@ -111,16 +115,17 @@ pub(in crate::bvh) fn build_group(
         subtrees.push(Subtree {
             instance: input.members[k],
             geometry: geometry_of(k),
-            triangles: mesh_of(k).indices.len() as u32,
+            triangles: size_of(k) as u32,
             units,
             base,
             first,
             depth,
         });
     }
-    let tree = assemble(subtrees, input.options.quality.config(), notes)?;
-    let group = MeshGroup::new(tree, input.frame, input.reach, input.origin)?;
-    Some((Arc::new(group), members))
+    input.progress.check()?;
+    let tree = assemble(subtrees, input.options.quality.config(), notes, input.progress)?;
+    let group = tree.and_then(|tree| MeshGroup::new(tree, input.frame, input.reach, input.origin));
+    Ok(group.map(|group| (Arc::new(group), members)))
 }
 
 /// The group of the earlier world when it has the same meshes, in the same order and space.
@@ -128,13 +133,13 @@ fn unchanged_group(
     input: &GroupInput<'_>,
     known: &KnownTrees<'_>,
     group: &Arc<MeshGroup>,
-) -> Option<(Arc<MeshGroup>, Vec<Arc<Blas>>)> {
+) -> Option<BuiltGroup> {
     if group.frame != input.frame || group.members.len() != input.members.len() {
         return None;
     }
     let same = |(m, &instance): (&Member, &u32)| {
         let geometry = input.instances[instance as usize].geometry;
-        let old = known.get(&input.geometries[geometry].address())?;
+        let old = known.get(&input.sources.geometries[geometry].address())?;
         (m.instance == instance && m.geometry == geometry && old.geometry == geometry)
             .then(|| Arc::clone(old.blas))
     };

@@ -42,13 +42,13 @@ pub(in crate::bvh) fn choose_members(
         uses[i.geometry] += 1;
     }
     let bounds_of = |(i, instance): (usize, &Instance)| {
-        let Geometry::Mesh(mesh) = &geometries[instance.geometry] else { return None };
         if uses[instance.geometry] != 1 || instance.world_from_object != DAffine3::IDENTITY {
             return None;
         }
-        let b = mesh.bounds();
+        let mesh = geometries[instance.geometry].mesh_extent()?;
+        let b = mesh.bounds;
         let corners = [b.min, b.max].map(|p| p.as_dvec3() + mesh.origin);
-        let usable = !b.is_empty() && !mesh.indices.is_empty();
+        let usable = !b.is_empty() && mesh.triangles > 0;
         (usable && corners.iter().all(|p| p.is_finite())).then_some((i as u32, corners))
     };
     let mut found: Vec<(u32, [DVec3; 2])> =

@@ -1,7 +1,7 @@
 //! The upper part of a group's tree, over nodes and leaves from inside the subtrees.
 
 use super::subtree::Subtree;
-use crate::bvh::build::{BuilderConfig, LeafCapacity, PrimRef, build_wide};
+use crate::bvh::build::{BuilderConfig, LeafCapacity, PrimRef, Progress, Stopped, build_wide};
 use crate::bvh::layout::triangles::{TriWriter, leaf_floats, leaf_triangle_ids};
 use crate::bvh::layout::wide::{
     CHILD_ROW, ChildRef, LeafWriter, NODE_UNITS, Unit, WIDTH, WideBvh, get_box, set_box,
@@ -41,6 +41,7 @@ struct OpenedWriter;
 impl LeafWriter for OpenedWriter {
     const UNITS: usize = 0;
     const CAPACITY: usize = 1;
+    const COUNTS: bool = false;
 
     fn write(&self, _: &[u32], _: &mut [Unit]) {}
 
@@ -57,7 +58,8 @@ pub(super) fn build_upper(
     subtrees: &[Subtree<'_>],
     mut config: BuilderConfig,
     notes: &mut Vec<String>,
-) -> Upper {
+    progress: &Progress<'_>,
+) -> Result<Upper, Stopped> {
     let triangles = subtrees.iter().map(|s| s.triangles as usize).filter(|&n| n >= LARGE_MESH);
     let count = triangles.sum::<usize>() / TRIANGLES_PER_OPENED;
     let of_roots: Vec<Vec<Opened>> = subtrees
@@ -69,8 +71,8 @@ pub(super) fn build_upper(
     let more = open_largest(subtrees, &mut opened, count);
     let refs = opened.iter().enumerate().map(|(i, o)| PrimRef::new(o.bounds, i as u32)).collect();
     config.sah.leaves = LeafCapacity::One;
-    let tree = build_wide(refs, &OpenedWriter, config, notes);
-    Upper { tree, opened, replaced: subtrees.len() + more }
+    let tree = build_wide(refs, &OpenedWriter, config, notes, progress)?;
+    Ok(Upper { tree, opened, replaced: subtrees.len() + more })
 }
 
 /// Replaces nodes in `opened` by their children, at most `count` of them and the one with the

@@ -243,7 +243,7 @@ mod tests {
         let frame = LocalFrame { center: DVec3::ZERO, scale: 1.0 };
         let mut units = [Unit::ZERO; TRI_LEAF_UNITS];
         let ids: Vec<u32> = (0..n).collect();
-        TriWriter::new(&mesh, &frame, 0).write(&ids, &mut units);
+        TriWriter::new(mesh.triangles(), &frame, 0).write(&ids, &mut units);
         (bytemuck::cast(units), mesh)
     }
 
