@@ -11,6 +11,8 @@ pub(crate) enum InstanceFilter<'a> {
     /// Unmarked instances.
     #[cfg_attr(not(feature = "render"), allow(dead_code, reason = "only the renderer marks some"))]
     Unmarked(&'a [bool]),
+    /// Instances whose mask has a bit of the ray's mask. A missing mask counts as zero.
+    Masked { instance_masks: &'a [u32], ray_mask: u32 },
 }
 
 impl InstanceFilter<'_> {
@@ -19,6 +21,9 @@ impl InstanceFilter<'_> {
         match self {
             InstanceFilter::All => true,
             InstanceFilter::Marked(marks) => marks.get(instance).is_some_and(|m| *m),
+            InstanceFilter::Masked { instance_masks, ray_mask } => {
+                instance_masks.get(instance).is_some_and(|mask| mask & ray_mask != 0)
+            }
             InstanceFilter::Unmarked(marks) => !marks.get(instance).is_some_and(|m| *m),
         }
     }

@@ -63,7 +63,7 @@ pub struct StreamError {
     pub answers: usize,
 }
 
-fn same_length(rays: usize, answers: usize) -> Result<(), StreamError> {
+pub(super) fn same_length(rays: usize, answers: usize) -> Result<(), StreamError> {
     if rays == answers { Ok(()) } else { Err(StreamError { rays, answers }) }
 }
 

@@ -41,7 +41,7 @@ impl<'a> TreeView<'a> {
     ) -> Self {
         let filtered_units = match filter {
             InstanceFilter::All => 0,
-            InstanceFilter::Marked(_) | InstanceFilter::Unmarked(_) => owners.len() * NODE_UNITS,
+            _ => owners.len() * NODE_UNITS,
         };
         TreeView { units: &bvh.units, filtered_units, owners, filter }
     }
