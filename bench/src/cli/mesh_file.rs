@@ -22,7 +22,7 @@ pub(super) fn read_mesh(common: CommonArgs, file: &Path) -> anyhow::Result<MeshS
     let all = subject.parts.len();
     let meshes = subject.parts.into_iter().filter_map(|part| match part.geometry {
         Geometry::Mesh(mesh) => Some(mesh),
-        Geometry::Shape(_) => None,
+        Geometry::Shape(_) | Geometry::Slices(_) => None,
     });
     let (meshes, moved): (Vec<Arc<TriMesh>>, usize) = with_one_origin(meshes.collect());
     if moved > 0 {

@@ -123,7 +123,7 @@ impl Subject {
     pub fn triangles(&self) -> usize {
         let count = |p: &Part| match &p.geometry {
             Geometry::Mesh(m) => m.num_triangles(),
-            Geometry::Shape(_) => 0,
+            Geometry::Shape(_) | Geometry::Slices(_) => 0,
         };
         self.parts.iter().map(count).sum()
     }
@@ -138,7 +138,9 @@ impl Subject {
                         m.indices.iter().flatten().filter_map(|&k| m.positions.get(k as usize));
                     used.filter(|p| p.is_finite()).for_each(|p| point(m.origin + p.as_dvec3()));
                 }
-                Geometry::Shape(_) => part.outline.iter().for_each(|p| point(*p)),
+                Geometry::Shape(_) | Geometry::Slices(_) => {
+                    part.outline.iter().for_each(|p| point(*p))
+                }
             }
         }
         if let Some(v) = &self.volume {

@@ -92,7 +92,7 @@ pub(super) fn choose(
     for geometry in part.scene.world.geometries() {
         match geometry {
             Geometry::Mesh(mesh) => meshes.push(mesh.clone()),
-            Geometry::Shape(_) => {
+            Geometry::Shape(_) | Geometry::Slices(_) => {
                 return Ok(forward(
                     "asked of the ranks in whose bounds rays come: ghost zones are made of \
                      triangles only, and the scene has other shapes"

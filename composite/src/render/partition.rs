@@ -96,7 +96,7 @@ impl Partition {
         let volume_bricks = Arc::new(VolumeBricks::one_per_rank(scene, parts));
         if let Split::Random { seed } = split {
             for (g, geometry) in scene.world.geometries().iter().enumerate() {
-                for p in 0..count(geometry) as u32 {
+                for p in 0..geometry.num_primitives() as u32 {
                     let mut random = SplitMix64::new(*seed ^ (g as u64) << 40 ^ u64::from(p));
                     let rank = random.bits() % parts as u64;
                     primitive_ids[rank as usize][g].push(p);
@@ -188,19 +188,12 @@ impl Partition {
     }
 }
 
-fn count(geometry: &Geometry) -> usize {
-    match geometry {
-        Geometry::Mesh(mesh) => mesh.indices.len(),
-        Geometry::Shape(shape) => shape.num_primitives(),
-    }
-}
-
 fn items(scene: &Scene, split: &Split) -> Vec<Item> {
     let mut out = Vec::new();
     for (g, geometry) in scene.world.geometries().iter().enumerate() {
         let first = scene.world.instances().iter().find(|i| i.geometry == g);
         let place = first.map_or(DAffine3::IDENTITY, |i| i.world_from_object);
-        for p in 0..count(geometry) {
+        for p in 0..geometry.num_primitives() {
             let [lo, hi] = box_of(geometry, p);
             // A primitive that cannot be hit may be anywhere.
             let (lo, hi) = if lo.is_finite() && hi.is_finite() {
@@ -240,6 +233,8 @@ fn box_of(geometry: &Geometry, primitive: usize) -> [DVec3; 2] {
             let b = shape.bounds(primitive as u32);
             [shape.origin() + b.min.as_dvec3(), shape.origin() + b.max.as_dvec3()]
         }
+        // Scene::part refuses them by name.
+        Geometry::Slices(_) => [DVec3::NAN; 2],
     }
 }
 

@@ -315,6 +315,7 @@ mod tests {
         let shape = |w: &World| match &w.geometries()[0] {
             rt_core::bvh::Geometry::Shape(s) => Arc::as_ptr(s).cast::<()>(),
             rt_core::bvh::Geometry::Mesh(m) => Arc::as_ptr(m).cast::<()>(),
+            rt_core::bvh::Geometry::Slices(s) => Arc::as_ptr(s).cast::<()>(),
         };
         assert_eq!(shape(&first), shape(&moved), "and keeps the geometry with its tree");
         put(ball, "radius", DataType::FLOAT32, floats(&[0.5]));

@@ -302,6 +302,7 @@ impl WorldCompiler<'_> {
         for d in surfaces.iter() {
             let address = match &d.geometry {
                 Geometry::Mesh(m) => Arc::as_ptr(m) as usize,
+                Geometry::Slices(s) => Arc::as_ptr(s) as usize,
                 Geometry::Shape(s) => Arc::as_ptr(s) as *const () as usize,
             };
             let out = &mut self.out;
