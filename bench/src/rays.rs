@@ -7,7 +7,7 @@
 //! tracer that found it.
 
 use glam::{DVec3, Vec3};
-use rt_core::mesh::TriMesh;
+use rt_core::math::Aabb;
 pub use rt_core::ray::{HitBlock, LANES, NO_HIT, RayBlock};
 
 /// One ray in f64, before it is rounded into a block.
@@ -90,9 +90,9 @@ pub struct View {
 }
 
 impl View {
-    /// The whole mesh, filling a field of view of 30 degrees.
-    pub fn orbit(mesh: &TriMesh) -> View {
-        let (center, radius) = center_and_radius(mesh);
+    /// Everything in `bounds`, filling a field of view of 30 degrees.
+    pub fn orbit(bounds: Aabb) -> View {
+        let (center, radius) = center_and_radius(bounds);
         let distance = radius / (15f64.to_radians()).sin();
         View::looking(
             "orbit",
@@ -104,8 +104,8 @@ impl View {
     }
 
     /// Close to the surface, so that nearly every pixel shows it.
-    pub fn close(mesh: &TriMesh) -> View {
-        let (center, radius) = center_and_radius(mesh);
+    pub fn close(bounds: Aabb) -> View {
+        let (center, radius) = center_and_radius(bounds);
         let eye = DVec3::new(0.9, 0.5, 1.0).normalize() * radius * 1.15;
         View::looking("close", center, eye, DVec3::new(0.1, 0.12, 0.05) * radius, radius)
     }
@@ -151,10 +151,10 @@ pub struct SurfacePoint {
     pub normal: DVec3,
 }
 
-/// The points that rays hit, from the triangle numbers that a tracer found. Rays without a hit give
-/// no point.
+/// The points that rays hit, from the instances and triangle numbers that a tracer found, which
+/// `corners` turns into triangles. Rays without a hit give no point.
 pub fn surface_points(
-    mesh: &TriMesh,
+    corners: impl Fn(u32, u32) -> [DVec3; 3],
     rays: &RaySet,
     hits: &[HitBlock],
     radius: f64,
@@ -167,7 +167,7 @@ pub fn surface_points(
         }
         let (o, d) = rays.ray(i);
         let (o, d) = (o.as_dvec3(), d.as_dvec3());
-        let [a, b, c] = mesh.triangle(prim as usize).map(|p| p.as_dvec3());
+        let [a, b, c] = corners(hits[i / LANES].instance[i % LANES], prim);
         let mut normal = (b - a).cross(c - a).normalize_or_zero();
         if normal == DVec3::ZERO {
             continue;
@@ -225,8 +225,7 @@ pub fn ambient_occlusion(points: &[SurfacePoint]) -> RaySet {
 }
 
 /// Incoherent rays: from random positions inside the mesh's bounds in random directions.
-pub fn incoherent(mesh: &TriMesh, count: usize) -> RaySet {
-    let bounds = mesh.bounds();
+pub fn incoherent(bounds: Aabb, count: usize) -> RaySet {
     let (lo, hi) = (bounds.min.as_dvec3(), bounds.max.as_dvec3());
     RaySet::pack((0..count as u32).map(|i| {
         let r = |k: u32| unit(hash(i).wrapping_add(k.wrapping_mul(0x9e37_79b9)));
@@ -238,8 +237,7 @@ pub fn incoherent(mesh: &TriMesh, count: usize) -> RaySet {
     }))
 }
 
-fn center_and_radius(mesh: &TriMesh) -> (DVec3, f64) {
-    let b = mesh.bounds();
+fn center_and_radius(b: Aabb) -> (DVec3, f64) {
     let (lo, hi) = (b.min.as_dvec3(), b.max.as_dvec3());
     ((lo + hi) * 0.5, (hi - lo).length() * 0.5)
 }
@@ -280,7 +278,7 @@ mod tests {
 
     #[test]
     fn sixteen_primary_rays_are_a_square_of_pixels() {
-        let view = View::orbit(&square());
+        let view = View::orbit(square().bounds());
         let rays = view.primary(32);
         assert_eq!((rays.len, rays.blocks.len()), (1024, 64));
         let pixel = |i: usize| {
@@ -326,7 +324,12 @@ mod tests {
         let rays = RaySet::pack([Ray64 { origin, direction, t_max: 9.0 }]);
         let mut hits = [HitBlock::MISS];
         hits[0].prim[0] = 0;
-        let points = surface_points(&mesh, &rays, &hits, 1.0);
+        let points = surface_points(
+            |_, prim| mesh.triangle(prim as usize).map(|p| p.as_dvec3()),
+            &rays,
+            &hits,
+            1.0,
+        );
         let p = points[0];
         // The plane is z = x/4; the hit is at (0.3, 0.2, 0.075).
         let height = (p.origin.z - 0.25 * p.origin.x) / (1.0f64 + 0.0625).sqrt();

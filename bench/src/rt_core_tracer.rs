@@ -1,10 +1,11 @@
 //! Implements the baselines' interface for rt-core.
 
 use crate::baselines::{BuildCost, Tracer};
+use crate::meshes::MeshScene;
 use crate::{clock, memory, rays};
-use glam::{DAffine3, Vec3};
+use glam::Vec3;
 use rays::{HitBlock, LANES, RayBlock};
-use rt_core::bvh::{BuildError, BuildOptions, Geometry, Instance, World};
+use rt_core::bvh::{BuildError, BuildOptions, Geometry, World};
 use rt_core::mesh::TriMesh;
 use std::sync::Arc;
 
@@ -44,17 +45,18 @@ pub struct RtCoreTracer {
 impl RtCoreTracer {
     /// Builds on rayon's current pool.
     pub fn build(mesh: &Arc<TriMesh>, options: &BuildOptions) -> Result<RtCoreTracer, BuildError> {
-        RtCoreTracer::build_many(std::slice::from_ref(mesh), options)
+        RtCoreTracer::build_scene(&MeshScene::one("", Arc::clone(mesh)), options)
     }
 
-    /// Builds a world of `meshes`, which have one origin, each as a geometry of its own.
-    pub fn build_many(
-        meshes: &[Arc<TriMesh>],
+    /// Builds a world of `scene`, whose meshes have one origin. An instance that is turned must
+    /// have its origin at zero, as [`MeshScene::corners`] has.
+    pub fn build_scene(
+        scene: &MeshScene,
         options: &BuildOptions,
     ) -> Result<RtCoreTracer, BuildError> {
+        let meshes = &scene.meshes;
         let geometries: Vec<Geometry> = meshes.iter().cloned().map(Geometry::Mesh).collect();
-        let place = |geometry| Instance { geometry, world_from_object: DAffine3::IDENTITY };
-        let instances: Vec<Instance> = (0..meshes.len()).map(place).collect();
+        let instances = scene.instances.clone();
         let ((world, time), peak_bytes) =
             memory::peak(|| clock::measure(|| World::build(geometries, instances, options)));
         let world = world?;

@@ -229,9 +229,14 @@ pub(crate) mod testing {
                     hits.iter().map(|h| (0..LANES).fold(0, |m, l| m | lane(h, l))).collect();
                 Case { kind, rays, hits, masks }
             };
-            let view = View::orbit(&mesh);
+            let view = View::orbit(mesh.bounds());
             let primary = case("primary", view.primary(32));
-            let points = rays::surface_points(&mesh, &primary.rays, &primary.hits, view.radius);
+            let points = rays::surface_points(
+                |_, prim| mesh.triangle(prim as usize).map(|p| p.as_dvec3()),
+                &primary.rays,
+                &primary.hits,
+                view.radius,
+            );
             assert!(points.len() > 200, "the view shows the mesh");
             let light = view.light();
             vec![
@@ -239,7 +244,7 @@ pub(crate) mod testing {
                 case("shadow", rays::shadow(&points, light)),
                 case("shadow from the light", rays::shadow_from_light(&points, light)),
                 case("ambient occlusion", rays::ambient_occlusion(&points)),
-                case("incoherent", rays::incoherent(&mesh, 2003)),
+                case("incoherent", rays::incoherent(mesh.bounds(), 2003)),
             ]
         })
     }

@@ -6,7 +6,7 @@ use super::Context;
 use super::compare::{self, Contender, Kind};
 use super::installed_tracers::InstalledBaselines;
 use crate::baselines::embree::{Embree, EmbreeScene, Options, Quality};
-use crate::meshes;
+use crate::meshes::{self, MeshScene};
 use crate::plot::{Axis, Plot, Point, Series};
 use crate::rays::View;
 use crate::record::{Record, Row};
@@ -87,10 +87,11 @@ fn scene(
         context.report_step(format!("{name}: building {baseline}"))?;
         baselines.push((baseline, EmbreeScene::build(e, mesh, &options)?));
     }
-    let view = View::orbit(mesh);
+    let view = View::orbit(mesh.bounds());
     let kinds = [Kind::Primary, Kind::AmbientOcclusion];
+    let rays_from = MeshScene::one(name, Arc::clone(mesh));
     for (kind, rays) in
-        compare::make_rays(mesh, &view, pixels, &kinds, &built[0].1.view(Mode::Coherent))
+        compare::make_rays(&rays_from, &view, pixels, &kinds, &built[0].1.view(Mode::Coherent))
     {
         let rays = if context.quick { rays.thinned(1 << 18) } else { rays };
         context.report_step(format!("{name}: {} rays", kind.name()))?;

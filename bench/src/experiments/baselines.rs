@@ -20,6 +20,7 @@ const OURS_FAST: &str = "rt-core fast";
 pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
     compare::explain_columns(record);
     record.column("meshes", "", "meshes of the scene, each a geometry of its own");
+    record.column("instances", "", "placed meshes, each with all of its triangles");
     record.column("build", "s", "build on all threads, wall time");
     record.column("build_cpu", "s", "build, CPU time of all threads");
     record.column("bytes_per_triangle", "B", "memory of the structure, without the input mesh");
@@ -71,10 +72,15 @@ const FULL: &[(&str, &[Isa])] = &[
     ("cells", &[Isa::Best]),
     ("terrain", &[Isa::Best]),
     ("city", &[Isa::Best, Isa::Avx2]),
+    ("forest", &[Isa::Best, Isa::Avx2]),
     ("slivers", &[Isa::Best]),
 ];
-const QUICK: &[(&str, &[Isa])] =
-    &[("wavelet 1M", &[Isa::Best]), ("pipes", &[Isa::Best]), ("city", &[Isa::Best])];
+const QUICK: &[(&str, &[Isa])] = &[
+    ("wavelet 1M", &[Isa::Best]),
+    ("pipes", &[Isa::Best]),
+    ("city", &[Isa::Best]),
+    ("forest", &[Isa::Best]),
+];
 
 /// Makes a scene of [`FULL`], smaller for quick runs.
 fn scene(context: &mut Context<'_>, name: &str) -> anyhow::Result<MeshScene> {
@@ -87,6 +93,7 @@ fn scene(context: &mut Context<'_>, name: &str) -> anyhow::Result<MeshScene> {
         "cells" => meshes::cells(size(69, 25)),
         "terrain" => meshes::terrain(size(4_000_000, 200_000)),
         "slivers" => meshes::slivers(size(500_000, 50_000)),
+        "forest" => return Ok(meshes::forest(size(20_000, 1000))),
         "city" => return Ok(meshes::city(size(3000, 300))),
         _ => anyhow::bail!("there is no scene `{name}`"),
     };
@@ -100,7 +107,7 @@ fn measure(
     scene: &MeshScene,
     isa: Isa,
 ) -> anyhow::Result<()> {
-    let (name, mesh) = (scene.name.as_str(), &scene.merged);
+    let (name, triangles) = (scene.name.as_str(), scene.num_triangles());
     let full_name =
         if isa == Isa::Best { name.to_string() } else { format!("{name}, {}", isa.name()) };
     let tracers = TracerSet::build(scene, installed, isa, &mut |s| {
@@ -108,13 +115,14 @@ fn measure(
     })?;
     let base = Row::new()
         .with("mesh", name)
-        .with("triangles", mesh.num_triangles())
-        .with("meshes", scene.meshes().len())
+        .with("triangles", triangles)
+        .with("meshes", scene.meshes.len())
+        .with("instances", scene.instances.len())
         .with("simd", isa.name());
 
     // ---- Builds. Each was built once; fig4.7 measures build times in alternation.
     for (tracer, cost) in tracers.costs() {
-        let per_triangle = |bytes: u64| bytes as f64 / mesh.num_triangles() as f64;
+        let per_triangle = |bytes: u64| bytes as f64 / triangles as f64;
         let row = base.clone().with("tracer", tracer).with("build", cost.wall_secs);
         let row = row
             .with("build_cpu", cost.cpu_secs)
@@ -124,7 +132,8 @@ fn measure(
 
     // ---- Rays.
     let size = if context.quick { 512 } else { 1024 };
-    let views = [View::orbit(mesh), View::close(mesh)];
+    let bounds = scene.bounds();
+    let views = [View::orbit(bounds), View::close(bounds)];
     let views = if context.quick && name != "wavelet 1M" { &views[..1] } else { &views[..] };
     for view in views {
         let kinds = if context.quick {
@@ -133,7 +142,7 @@ fn measure(
             &Kind::ALL
         };
         let watertight = tracers.ours[0].1.view(crate::rt_core_tracer::Mode::Coherent);
-        for (kind, rays) in compare::make_rays(mesh, view, size, kinds, &watertight) {
+        for (kind, rays) in compare::make_rays(scene, view, size, kinds, &watertight) {
             // Eight ambient-occlusion rays per pixel: a subset of blocks from the whole image is
             // enough.
             let rays = rays.thinned(if context.quick { 1 << 18 } else { 1 << 21 });

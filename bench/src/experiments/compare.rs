@@ -1,10 +1,10 @@
 //! Times tracers on the same rays.
 
 use crate::baselines::{Tracer, closest_all, count_hits, count_occluded, occluded_all};
+use crate::meshes::MeshScene;
 use crate::rays::{self, HitBlock, RaySet, View};
 use crate::record::{Record, Row};
 use crate::runner::{Schedule, Timings, Unstable, Variant, interleave};
-use rt_core::mesh::TriMesh;
 use std::cell::RefCell;
 use std::time::Instant;
 
@@ -51,7 +51,7 @@ impl Kind {
 /// Generates the rays of a kind for a view of `size` x `size` pixels; `tracer` finds the surface on
 /// which they start.
 pub(super) fn make_rays(
-    mesh: &TriMesh,
+    scene: &MeshScene,
     view: &View,
     size: u32,
     kinds: &[Kind],
@@ -60,13 +60,13 @@ pub(super) fn make_rays(
     let primary = view.primary(size);
     let mut hits = vec![HitBlock::MISS; primary.blocks.len()];
     closest_all(tracer, &primary, &mut hits, 0);
-    let points = rays::surface_points(mesh, &primary, &hits, view.radius);
+    let points = rays::surface_points(|i, p| scene.corners(i, p), &primary, &hits, view.radius);
     let make = |kind: Kind| match kind {
         Kind::Primary => primary.clone(),
         Kind::Shadow => rays::shadow(&points, view.light()),
         Kind::ShadowFromLight => rays::shadow_from_light(&points, view.light()),
         Kind::AmbientOcclusion => rays::ambient_occlusion(&points),
-        Kind::Incoherent => rays::incoherent(mesh, (size * size) as usize),
+        Kind::Incoherent => rays::incoherent(scene.bounds(), (size * size) as usize),
     };
     kinds.iter().map(|&k| (k, make(k))).collect()
 }
@@ -182,4 +182,27 @@ pub(super) fn best_mode(
     let median = |name: &str| timings.summary(name).map_or(f64::INFINITY, |s| s.median);
     let names = contenders.iter().filter(|c| c.tracer_name == tracer_name).map(Contender::name);
     names.min_by(|a, b| median(a).total_cmp(&median(b)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::meshes;
+    use crate::rt_core_tracer::{Mode, RtCoreTracer};
+
+    #[test]
+    fn rays_from_the_surface_of_many_meshes_start_on_the_mesh_that_was_hit() {
+        for scene in [meshes::city(16), meshes::forest(60)] {
+            let ours = RtCoreTracer::build_scene(&scene, &Default::default()).unwrap();
+            let (view, kinds) = (View::orbit(scene.bounds()), [Kind::Shadow]);
+            let rays = make_rays(&scene, &view, 64, &kinds, &ours.view(Mode::Coherent));
+            let [(_, rays)] = &rays[..] else { panic!("one kind of rays") };
+            assert!(rays.len > 200, "{}: {} rays", scene.name, rays.len);
+            for i in 0..rays.len {
+                let point = ours.world.closest_point(rays.ray(i).0, f32::INFINITY);
+                let distance = f64::from(point.unwrap().unwrap().distance);
+                assert!(distance < 1e-4 * view.radius, "{}: ray {i}, {distance}", scene.name);
+            }
+        }
+    }
 }

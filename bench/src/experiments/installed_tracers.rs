@@ -94,7 +94,7 @@ impl TracerSet {
             let options = BuildOptions { robustness, simd: isa.ours(), ..Default::default() };
             tracers.ours.push((
                 format!("rt-core {}", robustness.name()),
-                RtCoreTracer::build_many(scene.meshes(), &options)?,
+                RtCoreTracer::build_scene(scene, &options)?,
             ));
         }
         for e in &installed.embree {
@@ -104,15 +104,14 @@ impl TracerSet {
                 let kind = if robust { "robust" } else { "fast" };
                 tracers.embree.push((
                     format!("{} {kind}", e.name()),
-                    EmbreeScene::build_many(e, scene.meshes(), &options)?,
+                    EmbreeScene::build_scene(e, scene, &options)?,
                 ));
             }
         }
         // obvhs has no scenes of many meshes.
-        if isa == Isa::Best && scene.parts.is_empty() {
+        if let Some(mesh) = scene.only_mesh().filter(|_| isa == Isa::Best) {
             report_step("building obvhs")?;
-            tracers.obvhs =
-                Some(("obvhs CWBVH".into(), Obvhs::build(&scene.merged, Preset::Medium)?));
+            tracers.obvhs = Some(("obvhs CWBVH".into(), Obvhs::build(mesh, Preset::Medium)?));
         }
         Ok(tracers)
     }

@@ -59,11 +59,13 @@ mod tests {
     #[test]
     fn a_city_has_many_clean_meshes_of_different_size() {
         let scene = city(400);
-        assert_eq!(scene.parts.len(), 400);
-        let sizes: Vec<usize> = scene.parts.iter().map(|m| m.num_triangles()).collect();
+        assert_eq!(scene.meshes.len(), 400);
+        let sizes: Vec<usize> = scene.meshes.iter().map(|m| m.num_triangles()).collect();
         let (least, most) = (sizes.iter().min().unwrap(), sizes.iter().max().unwrap());
         assert!((60..=130).contains(least) && (9_000..=21_000).contains(most), "{least}, {most}");
-        assert_eq!(scene.merged.num_triangles(), sizes.iter().sum::<usize>());
-        assert_eq!(scene.merged.validate().skipped() + scene.merged.validate().zero_area, 0);
+        assert_eq!(scene.num_triangles(), sizes.iter().sum::<usize>());
+        for mesh in &scene.meshes {
+            assert_eq!(mesh.validate().skipped() + mesh.validate().zero_area, 0);
+        }
     }
 }

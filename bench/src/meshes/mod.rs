@@ -4,11 +4,13 @@
 mod anisotropic;
 mod cells;
 mod city;
+mod forest;
 mod scene;
 
 pub use anisotropic::{slivers, terrain};
 pub use cells::cells;
 pub use city::city;
+pub use forest::forest;
 pub use scene::MeshScene;
 
 use anyhow::Context as _;

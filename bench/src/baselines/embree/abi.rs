@@ -7,10 +7,12 @@ pub(super) type Handle = *mut c_void;
 
 pub(super) const INVALID_ID: u32 = u32::MAX;
 pub(super) const GEOMETRY_TYPE_TRIANGLE: c_int = 0;
+pub(super) const GEOMETRY_TYPE_INSTANCE: c_int = 121;
 pub(super) const BUFFER_TYPE_INDEX: c_int = 0;
 pub(super) const BUFFER_TYPE_VERTEX: c_int = 1;
 pub(super) const FORMAT_UINT3: c_int = 0x5003;
 pub(super) const FORMAT_FLOAT3: c_int = 0x9003;
+pub(super) const FORMAT_FLOAT3X4_COLUMN_MAJOR: c_int = 0x9234;
 pub(super) const SCENE_FLAG_COMPACT: c_int = 1 << 1;
 pub(super) const SCENE_FLAG_ROBUST: c_int = 1 << 2;
 /// `RTC_INTERSECT_CONTEXT_FLAG_COHERENT` of Embree 3.
@@ -137,6 +139,9 @@ pub(super) struct Calls {
     pub(super) set_geometry_build_quality: unsafe extern "C" fn(Handle, c_int),
     pub(super) commit_geometry: unsafe extern "C" fn(Handle),
     pub(super) attach_geometry: unsafe extern "C" fn(Handle, Handle) -> c_uint,
+    pub(super) set_geometry_instanced_scene: unsafe extern "C" fn(Handle, Handle),
+    /// Arguments: geometry, time step, format, matrix.
+    pub(super) set_geometry_transform: unsafe extern "C" fn(Handle, c_uint, c_int, *const c_void),
     /// Arguments: geometry, type, slot, format, pointer, byte offset, byte stride, item count.
     pub(super) set_shared_geometry_buffer:
         unsafe extern "C" fn(Handle, c_int, c_uint, c_int, *const c_void, usize, usize, usize),

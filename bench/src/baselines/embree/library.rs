@@ -183,6 +183,8 @@ unsafe fn calls(
         set_geometry_build_quality: symbol!("rtcSetGeometryBuildQuality"),
         commit_geometry: symbol!("rtcCommitGeometry"),
         attach_geometry: symbol!("rtcAttachGeometry"),
+        set_geometry_instanced_scene: symbol!("rtcSetGeometryInstancedScene"),
+        set_geometry_transform: symbol!("rtcSetGeometryTransform"),
         set_shared_geometry_buffer: symbol!("rtcSetSharedGeometryBuffer"),
         queries: match version {
             Version::V3 => {

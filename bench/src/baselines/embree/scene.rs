@@ -6,11 +6,12 @@ use super::abi::{self, Arguments4, Context3, Handle, HitN, Queries, RayHitN, Ray
 use super::library::Embree;
 use crate::baselines::{BaselineError, BuildCost, Tracer, require_clean};
 use crate::clock;
+use crate::meshes::MeshScene;
 use crate::rays::{HitBlock, LANES, NO_HIT, RayBlock};
 use core::ffi::{c_int, c_void};
 use rt_core::mesh::TriMesh;
-use std::borrow::Borrow;
 use std::ffi::CString;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, Ordering};
 
 /// `RTCBuildQuality`.
@@ -135,17 +136,25 @@ impl EmbreeScene {
         mesh: &TriMesh,
         options: &Options,
     ) -> Result<EmbreeScene, BaselineError> {
-        EmbreeScene::build_many(embree, &[mesh], options)
+        EmbreeScene::build_scene(embree, &MeshScene::one("", Arc::new(mesh.clone())), options)
     }
 
-    /// Builds a scene of `meshes`, each a geometry of its own. Hits tell the triangle's number in
-    /// its mesh.
-    pub fn build_many(
+    /// Builds a scene in which each mesh is a geometry of its own; when some are transformed or
+    /// used more than once, each is a scene of its own with Embree's instances. Hits tell the
+    /// triangle's number in its mesh.
+    pub fn build_scene(
         embree: &Embree,
-        meshes: &[impl Borrow<TriMesh>],
+        scene: &MeshScene,
         options: &Options,
     ) -> Result<EmbreeScene, BaselineError> {
-        let meshes: Vec<&TriMesh> = meshes.iter().map(Borrow::borrow).collect();
+        let meshes: Vec<&TriMesh> = scene.meshes.iter().map(|m| &**m).collect();
+        let instanced = !scene.is_unmoved();
+        let transforms: Vec<[f32; 12]> = scene
+            .instances
+            .iter()
+            .map(|i| i.world_from_object.to_cols_array().map(|x| x as f32))
+            .collect();
+        let placed = &scene.instances;
         meshes.iter().try_for_each(|m| require_clean(m))?;
         let calls = embree.calls;
         let failed = |code: c_int, doing: &'static str| BaselineError::Failed {
@@ -168,20 +177,27 @@ impl EmbreeScene {
         // monitor's data is boxed, lives in `self` and is dropped after the device; the arrays have
         // the counts and strides given, all indices are below the vertex count (`require_clean`),
         // and they live in `self` until the scene is released. The geometry's reference is given to
-        // the scene. Handles are released once, in `Drop` or below on failure.
+        // the scene; scenes of single meshes are kept by their instances. Embree copies a
+        // transform, which has the twelve floats of its format. Handles are released once, in
+        // `Drop` or below on failure.
         let (device, scene, time) = unsafe {
             let device = (calls.new_device)(config.as_ptr());
             if device.is_null() {
                 return Err(failed((calls.get_device_error)(device), "making a device"));
             }
             (calls.set_memory_monitor)(device, monitor, (&raw const *memory).cast_mut().cast());
-            let scene = (calls.new_scene)(device);
-            let mut flags = 0;
-            flags |= if options.robust { abi::SCENE_FLAG_ROBUST } else { 0 };
-            flags |= if options.compact { abi::SCENE_FLAG_COMPACT } else { 0 };
-            (calls.set_scene_flags)(scene, flags);
             let quality = options.quality as c_int;
-            (calls.set_scene_build_quality)(scene, quality);
+            let new_scene = || {
+                let scene = (calls.new_scene)(device);
+                let mut flags = 0;
+                flags |= if options.robust { abi::SCENE_FLAG_ROBUST } else { 0 };
+                flags |= if options.compact { abi::SCENE_FLAG_COMPACT } else { 0 };
+                (calls.set_scene_flags)(scene, flags);
+                (calls.set_scene_build_quality)(scene, quality);
+                scene
+            };
+            let scene = new_scene();
+            let mut of_meshes = vec![];
             let share = calls.set_shared_geometry_buffer;
             for (mesh, (positions, indices)) in meshes.iter().zip(&arrays) {
                 let geometry = (calls.new_geometry)(device, abi::GEOMETRY_TYPE_TRIANGLE);
@@ -191,10 +207,28 @@ impl EmbreeScene {
                 share(geometry, abi::BUFFER_TYPE_VERTEX, 0, abi::FORMAT_FLOAT3, v, 0, 12, vertices);
                 share(geometry, abi::BUFFER_TYPE_INDEX, 0, abi::FORMAT_UINT3, i, 0, 12, triangles);
                 (calls.commit_geometry)(geometry);
-                (calls.attach_geometry)(scene, geometry);
+                let own = if instanced { new_scene() } else { scene };
+                (calls.attach_geometry)(own, geometry);
                 (calls.release_geometry)(geometry);
+                of_meshes.extend(instanced.then_some(own));
             }
-            let ((), time) = clock::measure(|| (calls.commit_scene)(scene));
+            let build = || {
+                of_meshes.iter().for_each(|&own| (calls.commit_scene)(own));
+                // None unless there are scenes to place.
+                for (i, transform) in placed.iter().zip(&transforms).filter(|_| instanced) {
+                    let geometry = (calls.new_geometry)(device, abi::GEOMETRY_TYPE_INSTANCE);
+                    (calls.set_geometry_instanced_scene)(geometry, of_meshes[i.geometry]);
+                    let (format, matrix) = (abi::FORMAT_FLOAT3X4_COLUMN_MAJOR, transform.as_ptr());
+                    (calls.set_geometry_transform)(geometry, 0, format, matrix.cast());
+                    (calls.commit_geometry)(geometry);
+                    (calls.attach_geometry)(scene, geometry);
+                    (calls.release_geometry)(geometry);
+                }
+                (calls.commit_scene)(scene);
+            };
+            let ((), time) = clock::measure(build);
+            // The instances keep them.
+            of_meshes.iter().for_each(|&own| (calls.release_scene)(own));
             let error = (calls.get_device_error)(device);
             if error != 0 {
                 (calls.release_scene)(scene);
@@ -484,6 +518,37 @@ mod tests {
                     let scene = EmbreeScene::build(embree, &mesh, &options).unwrap();
                     testing::agrees_with_brute_force(&scene.view(16, true));
                 }
+            }
+        });
+    }
+
+    #[test]
+    fn instances_are_where_those_of_rt_core_are() {
+        let scene = crate::meshes::forest(150);
+        let ours = crate::rt_core_tracer::RtCoreTracer::build_scene(&scene, &Default::default());
+        let ours = ours.unwrap();
+        let rays = crate::rays::View::orbit(scene.bounds()).primary(128);
+        let mut expected = vec![HitBlock::MISS; rays.blocks.len()];
+        ours.view(crate::rt_core_tracer::Mode::Coherent).closest(&rays.blocks, &mut expected);
+        with_each(|embree| {
+            let options = Options { robust: true, threads: 1, ..Options::default() };
+            let theirs = EmbreeScene::build_scene(embree, &scene, &options).unwrap();
+            for (width, coherent) in [(1, false), (8, true), (16, true), (16, false)] {
+                let mut hits = vec![HitBlock::MISS; rays.blocks.len()];
+                theirs.view(width, coherent).closest(&rays.blocks, &mut hits);
+                // Embree's matrices are f32, so rays at the edges of leaves may differ.
+                let (mut same, mut found) = (0, 0);
+                for i in 0..rays.len {
+                    let [a, b] = [&expected, &hits].map(|h| {
+                        let (block, lane) = (&h[i / LANES], i % LANES);
+                        (block.prim[lane], block.t[lane])
+                    });
+                    found += usize::from(a.0 != NO_HIT);
+                    let near = a.0 == NO_HIT || (a.1 - b.1).abs() < 1e-4 * a.1;
+                    same += usize::from(a.0 == b.0 && near);
+                }
+                assert!(found > rays.len / 10, "{found} hits");
+                assert!(same * 1000 >= rays.len * 997, "{same} of {} rays agree", rays.len);
             }
         });
     }
