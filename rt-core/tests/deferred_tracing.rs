@@ -189,13 +189,9 @@ fn cases() -> Vec<Case> {
 
 /// Distributes primitives to `parts` at random. With more parts than primitives, some are empty.
 fn deal(scene: &Scene, parts: usize, seed: u32) -> Vec<Vec<Vec<u32>>> {
-    use rt_core::bvh::Geometry;
     let mut out = vec![vec![vec![]; scene.world.geometries().len()]; parts];
     for (g, geometry) in scene.world.geometries().iter().enumerate() {
-        let count = match geometry {
-            Geometry::Mesh(m) => m.indices.len(),
-            Geometry::Shape(s) => s.num_primitives(),
-        };
+        let count = geometry.num_primitives();
         for k in 0..count as u32 {
             let mut x = k.wrapping_mul(0x9e37_79b9) ^ seed;
             x ^= x >> 15;
