@@ -72,15 +72,10 @@ const FULL: &[(&str, &[Isa])] = &[
     ("cells", &[Isa::Best]),
     ("terrain", &[Isa::Best]),
     ("city", &[Isa::Best, Isa::Avx2]),
-    ("forest", &[Isa::Best, Isa::Avx2]),
     ("slivers", &[Isa::Best]),
 ];
-const QUICK: &[(&str, &[Isa])] = &[
-    ("wavelet 1M", &[Isa::Best]),
-    ("pipes", &[Isa::Best]),
-    ("city", &[Isa::Best]),
-    ("forest", &[Isa::Best]),
-];
+const QUICK: &[(&str, &[Isa])] =
+    &[("wavelet 1M", &[Isa::Best]), ("pipes", &[Isa::Best]), ("city", &[Isa::Best])];
 
 /// Makes a scene of [`FULL`], smaller for quick runs.
 fn scene(context: &mut Context<'_>, name: &str) -> anyhow::Result<MeshScene> {
@@ -93,7 +88,6 @@ fn scene(context: &mut Context<'_>, name: &str) -> anyhow::Result<MeshScene> {
         "cells" => meshes::cells(size(69, 25)),
         "terrain" => meshes::terrain(size(4_000_000, 200_000)),
         "slivers" => meshes::slivers(size(500_000, 50_000)),
-        "forest" => return Ok(meshes::forest(size(20_000, 1000))),
         "city" => return Ok(meshes::city(size(3000, 300))),
         _ => anyhow::bail!("there is no scene `{name}`"),
     };
