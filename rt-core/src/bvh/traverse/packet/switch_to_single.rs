@@ -93,7 +93,7 @@ struct LaneRays<'a, 'r> {
 /// Group and lane of ray `number`.
 #[inline(always)]
 fn place(number: usize) -> (usize, usize) {
-    (number / LANES & 15, number % LANES)
+    ((number / LANES) & 15, number % LANES)
 }
 
 struct AnyRays<'a, 'r, T>(LaneRays<'a, 'r>, PhantomData<T>);
