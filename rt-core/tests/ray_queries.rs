@@ -219,7 +219,7 @@ fn a_filter_is_told_the_hit_that_is_returned() {
         let told = Mutex::new(Vec::new());
         let accept = |hit: &Hit| {
             told.lock().unwrap().push(bits(Some(*hit)));
-            hit.prim % 3 != 0
+            !hit.prim.is_multiple_of(3)
         };
         let hit = world.query().accepting(&accept).closest(&ray);
         let told = told.into_inner().unwrap();

@@ -79,7 +79,7 @@ impl<'w> Progress<'w> {
     /// Whether to go on with element `i` of a long loop; asks the caller from time to time.
     #[inline]
     pub(crate) fn goes_on_at(&self, i: u32) -> bool {
-        if i as usize % PRIMITIVES_BETWEEN_CHECKS == 0 {
+        if (i as usize).is_multiple_of(PRIMITIVES_BETWEEN_CHECKS) {
             return self.check().is_ok();
         }
         !self.is_stopped()
