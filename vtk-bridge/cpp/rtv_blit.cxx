@@ -8,7 +8,12 @@
 #include <vtkOpenGLState.h>
 #include <vtkShaderProgram.h>
 #include <vtkTextureObject.h>
+// VTK 9.4 and later load OpenGL with GLAD.
+#if __has_include(<vtk_glad.h>)
+#include <vtk_glad.h>
+#else
 #include <vtk_glew.h>
+#endif
 
 RtvBlit::~RtvBlit()
 {

@@ -11,7 +11,15 @@
 #include <vtkAssemblyPath.h>
 #include <vtkCompositeDataDisplayAttributes.h>
 #include <vtkCompositeDataSet.h>
+#include <vtkVersionMacros.h>
+// From VTK 9.3 on, vtkCompositePolyDataMapper has the attributes of blocks, and the older
+// vtkCompositePolyDataMapper2 goes.
+#if VTK_VERSION_NUMBER >= VTK_VERSION_CHECK(9, 3, 0)
+#include <vtkCompositePolyDataMapper.h>
+#endif
+#if __has_include(<vtkCompositePolyDataMapper2.h>)
 #include <vtkCompositePolyDataMapper2.h>
+#endif
 #include <vtkDataSetSurfaceFilter.h>
 #include <vtkGlyph3DMapper.h>
 #include <vtkInformation.h>
@@ -226,6 +234,24 @@ const char* AddPolyData(Actor& a, vtkPolyData* data, const BlockState& block, co
   return nullptr;
 }
 
+// The attributes of a mapper's blocks; null for mappers that have none.
+vtkCompositeDataDisplayAttributes* BlockAttributes(vtkMapper* mapper)
+{
+#if VTK_VERSION_NUMBER >= VTK_VERSION_CHECK(9, 3, 0)
+  if (auto composite = vtkCompositePolyDataMapper::SafeDownCast(mapper))
+  {
+    return composite->GetCompositeDataDisplayAttributes();
+  }
+#endif
+#if __has_include(<vtkCompositePolyDataMapper2.h>)
+  if (auto composite = vtkCompositePolyDataMapper2::SafeDownCast(mapper))
+  {
+    return composite->GetCompositeDataDisplayAttributes();
+  }
+#endif
+  return nullptr;
+}
+
 const char* AddTree(Actor& a, vtkDataObject* data, BlockState block, const std::string& name)
 {
   if (!data)
@@ -394,10 +420,7 @@ bool RtvExtractor::Add(RtvBridge* bridge, vtkRenderer* renderer, vtkProp* prop, 
   a.Points = a.Prop->GetProperty()->GetRepresentation() == VTK_POINTS;
   a.Edges = a.Prop->GetProperty()->GetRepresentation() == VTK_WIREFRAME;
   a.Matrix = a.Prop->GetMatrix();
-  if (auto composite = vtkCompositePolyDataMapper2::SafeDownCast(a.Mapper))
-  {
-    a.Attributes = composite->GetCompositeDataDisplayAttributes();
-  }
+  a.Attributes = BlockAttributes(a.Mapper);
   if (auto glyphs = vtkGlyph3DMapper::SafeDownCast(a.Mapper))
   {
     const char* reason = rtvAddGlyphs(bridge, a.Prop, glyphs, data, PropertyOf(a.Prop->GetProperty()), a.Name);

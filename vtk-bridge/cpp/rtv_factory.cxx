@@ -14,7 +14,7 @@ extern "C" VTK_ABI_EXPORT uint32_t rtv_shim_init(const RtvApi* api)
   if (api && api->abi() == RTV_ABI)
   {
     rtvApi = api;
-    rtvApi->host(VTK_MAJOR_VERSION, VTK_MINOR_VERSION);
+    rtvApi->host(VTK_MAJOR_VERSION, VTK_MINOR_VERSION, VTK_BUILD_VERSION);
   }
   return RTV_ABI;
 }

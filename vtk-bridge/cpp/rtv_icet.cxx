@@ -17,7 +17,12 @@
 #include <vtkRenderState.h>
 #include <vtkRenderer.h>
 #include <vtkUnsignedCharArray.h>
+// VTK 9.4 and later load OpenGL with GLAD.
+#if __has_include(<vtk_glad.h>)
+#include <vtk_glad.h>
+#else
 #include <vtk_glew.h>
+#endif
 
 #include <IceT.h>
 

@@ -8,6 +8,7 @@
 
 #include <vtkFrameBufferObjectBase.h>
 #include <vtkObjectFactory.h>
+#include <vtkOpenGLFXAAFilter.h>
 #include <vtkRenderPass.h>
 #include <vtkRenderTimerLog.h>
 #include <vtkTimeStamp.h>
@@ -123,6 +124,7 @@ int vtkRtvRenderer::UpdateGeometry(vtkFrameBufferObjectBase* fbo)
   {
     this->DrawPicture(0);
     this->DrawPicture(1);
+    this->Antialias();
     this->RenderTime.Modified();
   }
   else
@@ -143,6 +145,24 @@ void vtkRtvRenderer::DeviceRenderOpaqueGeometry(vtkFrameBufferObjectBase* fbo)
   this->DrawPicture(0);
   this->Superclass::DeviceRenderOpaqueGeometry(fbo);
   this->DrawPicture(1);
+}
+
+// The superclass does this in UpdateGeometry, but it returns early when it has no prop to draw.
+void vtkRtvRenderer::Antialias()
+{
+  if (!this->UseFXAA)
+  {
+    return;
+  }
+  if (!this->FXAAFilter)
+  {
+    this->FXAAFilter = vtkOpenGLFXAAFilter::New();
+  }
+  if (this->FXAAOptions)
+  {
+    this->FXAAFilter->UpdateConfiguration(this->FXAAOptions);
+  }
+  this->FXAAFilter->Execute(this);
 }
 
 void vtkRtvRenderer::DrawPicture(int stage)

@@ -81,6 +81,7 @@ protected:
 
 private:
   void DrawPicture(int stage);
+  void Antialias();
 
   RtvBridge* Bridge = nullptr;
   RtvExtractor Extractor;

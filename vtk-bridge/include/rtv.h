@@ -502,7 +502,7 @@ typedef struct RtvVolumeFacts {
   double average_range[2];
 } RtvVolumeFacts;
 /* Version of this interface, computed from its structures and calls (a test gives the value). A shim built for another version must not continue. */
-#define RTV_ABI 981677105u
+#define RTV_ABI 827436969u
 /* All calls in one table, so that a shim needs only one symbol. */
 typedef struct RtvApi {
   /* rtv_abi. */
@@ -516,7 +516,7 @@ typedef struct RtvApi {
   /* rtv_option. */
   double (*option)(char const*);
   /* rtv_host. */
-  void (*host)(uint32_t, uint32_t);
+  void (*host)(uint32_t, uint32_t, uint32_t);
   /* rtv_begin. */
   int32_t (*begin)(RtvBridge*);
   /* rtv_surface. */
@@ -567,8 +567,8 @@ int32_t rtv_set_bridge_option(RtvBridge* bridge, char const* name, char const* v
 double rtv_option(char const* name);
 /* As rtv_option, with the bridge's own options over those of the process: in a frame those that it began with, else those that one begun now would have; -1 also without a bridge. */
 double rtv_bridge_option(RtvBridge* bridge, char const* name);
-/* Tells which VTK the library is inside of: options whose default follows VTK's version (RTV_EDGES, RTV_VTK) take it from here, unless the environment or the program says otherwise. For all bridges of the process. */
-void rtv_host(uint32_t vtk_major, uint32_t vtk_minor);
+/* Tells which VTK the library is inside of: options whose default follows VTK's version (RTV_EDGES, RTV_VTK) take it from here, unless the environment or the program says otherwise. The build is VTK_BUILD_VERSION: 0 of 9.3.0, or a day, 20240617, between releases. For all bridges of the process. */
+void rtv_host(uint32_t vtk_major, uint32_t vtk_minor, uint32_t vtk_build);
 /* Begins a frame. Returns 0 if OpenGL should draw everything (RTV_OFF). */
 int32_t rtv_begin(RtvBridge* bridge);
 /* Adds a surface: 1 if it will be traced, 0 if it has nothing to trace, -1 if its arrays are invalid. */

@@ -73,7 +73,7 @@ pub struct Options {
     /// Radius of the tubes that replace lines and edges, data units; 0: they stay OpenGL's lines.
     pub line_radius: f64,
     /// How far corners of triangles with edges move outwards, line widths: the geometry shader of
-    /// VTK 9.0 to 9.2 moves them by a quarter. 0: edges end at the outline.
+    /// VTK 9.0 to 9.3.1 moves them by a quarter. 0: edges end at the outline.
     pub edge_reach: f64,
     /// Version of VTK, major and minor, whose shaders the image follows.
     pub vtk: (u32, u32),
@@ -158,7 +158,7 @@ pub const NAMES: &[(&str, &str, &str)] = &[
     ("RTV_LINE_RADIUS", "lines and edges become tubes of this radius, data units", "0 or positive"),
     (
         "RTV_EDGES",
-        "how far edges of surfaces reach beyond the outline, line widths (VTK up to 9.2: 0.25)",
+        "how far edges of surfaces reach beyond the outline, line widths (VTK up to 9.3.1: 0.25)",
         "0 to 4",
     ),
     (

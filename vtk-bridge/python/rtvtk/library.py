@@ -4,7 +4,7 @@ import os
 
 import numpy as np
 
-ABI = 981677105
+ABI = 827436969
 NONE, U8, F32, F64, I32, I64 = range(6)
 COLOR_PROPERTY, COLOR_POINTS, COLOR_CELLS, COLOR_MAPPED = range(4)
 LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SPOT = range(3)
@@ -169,7 +169,7 @@ def _functions(library, path):
         raise RtvError(f"{path} has interface {found}, this package needs {ABI}: install the package that belongs to the library")
     return dict(
         new=bind("rtv_new", p), free=bind("rtv_free", None, p), option=bind("rtv_bridge_option", C.c_double, p, text),
-        host=bind("rtv_host", None, C.c_uint32, C.c_uint32), begin=bind("rtv_begin", C.c_int32, p),
+        host=bind("rtv_host", None, C.c_uint32, C.c_uint32, C.c_uint32), begin=bind("rtv_begin", C.c_int32, p),
         surfaces=bind("rtv_surfaces", C.c_int32, p, C.POINTER(Surface), C.c_uint64),
         has_colors=bind("rtv_has_colors", C.c_int32, p, C.c_uint64, C.c_uint64),
         volume=bind("rtv_volume", text, p, C.POINTER(Volume)), has_volume=bind("rtv_has_volume", C.c_int32, p, C.c_uint64),
@@ -182,9 +182,9 @@ def _functions(library, path):
     )
 
 
-def set_host(major, minor):
+def set_host(major, minor, build):
     """Loads the library and tells it the VTK version. Raises `RtvError` if it cannot be loaded."""
-    Bridge.calls()["host"](major, minor)
+    Bridge.calls()["host"](major, minor, build)
 
 
 class Bridge:

@@ -15,7 +15,7 @@ from .extract import Extractor
 from .overlay import Overlay
 from .view import add_lights, prepare_lights, size_of, view_of
 
-_VERSION = (vtkVersion.GetVTKMajorVersion(), vtkVersion.GetVTKMinorVersion())
+_VERSION = (vtkVersion.GetVTKMajorVersion(), vtkVersion.GetVTKMinorVersion(), vtkVersion.GetVTKBuildVersion())
 
 
 class _Watched:

@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use vtk_bridge::options::NAMES;
 use vtk_bridge::setup::environment::{Program, anari_exports, exports};
-use vtk_bridge::setup::headers::{Flavour, find, places};
+use vtk_bridge::setup::headers::{Flavour, find, places, shares_vtk};
 use vtk_bridge::setup::layout::{Layout, library};
 use vtk_bridge::setup::{SetupError, doctor, plugin};
 
@@ -153,15 +153,7 @@ fn install(common: &CommonArgs, args: &InstallArgs) -> anyhow::Result<Status> {
             format!("load it with PV_PLUGIN_PATH={}", layout.plugin_folder(&pv.name).display()),
         );
     }
-    common.result(&done, || {
-        let list = done.built.join(", ");
-        format!(
-            "installed in {} for VTK {list}\nset VTK_AUTOLOAD_PATH={} (eval \"$(vtk-bridge env \
-             --vtk)\" does), and scripts are ray traced",
-            layout.prefix().display(),
-            layout.autoload().display()
-        )
-    })?;
+    common.result(&done, || done.summary(&layout))?;
     Ok(if done.failed.is_empty() { Status::Success } else { Status::Failure })
 }
 
@@ -189,14 +181,17 @@ fn env(common: &CommonArgs, args: &EnvArgs) -> anyhow::Result<Status> {
     }
     let program = if args.paraview { Program::ParaView } else { Program::Vtk };
     let (found, ..) = flavours(&[]);
-    let wanted: Vec<Flavour> = found.into_iter().filter(|f| program.runs(&f.name)).collect();
+    // A ParaView that is linked with the system's VTK needs the shim of that one.
+    let shared = program == Program::ParaView && places(variable).iter().any(|p| shares_vtk(p));
+    let runs = |name: &str| program.runs(name) || shared;
+    let wanted: Vec<Flavour> = found.into_iter().filter(|f| runs(&f.name)).collect();
     let built = layout.shims();
     let missing: Vec<Flavour> = wanted
         .iter()
         .filter(|f| !built.contains(&f.name) || !layout.sources_are_current())
         .cloned()
         .collect();
-    if wanted.is_empty() && !built.iter().any(|b| program.runs(b)) {
+    if wanted.is_empty() && !built.iter().any(|b| runs(b)) {
         return usage(SetupError::NotFound { asked: program.name(), cure: program.cure() });
     }
     let library = library();

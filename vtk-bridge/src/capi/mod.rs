@@ -33,7 +33,7 @@ pub struct RtvBridge {
 
 /// Version of this interface, computed from its structures and calls (a test gives the value). A
 /// shim built for another version must not continue.
-pub const RTV_ABI: u32 = 981_677_105;
+pub const RTV_ABI: u32 = 827_436_969;
 
 /// [`RTV_ABI`] of the library.
 #[unsafe(no_mangle)]
@@ -109,10 +109,11 @@ pub unsafe extern "C" fn rtv_bridge_option(bridge: *mut RtvBridge, name: *const 
 
 /// Tells which VTK the library is inside of: options whose default follows VTK's version
 /// (`RTV_EDGES`, `RTV_VTK`) take it from here, unless the environment or the program says
-/// otherwise. For all bridges of the process.
+/// otherwise. The build is `VTK_BUILD_VERSION`: 0 of 9.3.0, or a day, 20240617, between releases.
+/// For all bridges of the process.
 #[unsafe(no_mangle)]
-pub extern "C" fn rtv_host(vtk_major: u32, vtk_minor: u32) {
-    guarded((), || state::set_host(vtk_major, vtk_minor));
+pub extern "C" fn rtv_host(vtk_major: u32, vtk_minor: u32, vtk_build: u32) {
+    guarded((), || state::set_host(vtk_major, vtk_minor, vtk_build));
 }
 
 /// Begins a frame. Returns 0 if OpenGL should draw everything (`RTV_OFF`).
@@ -390,7 +391,7 @@ pub struct RtvApi {
     /// [`rtv_option`].
     pub option: unsafe extern "C" fn(*const c_char) -> f64,
     /// [`rtv_host`].
-    pub host: extern "C" fn(u32, u32),
+    pub host: extern "C" fn(u32, u32, u32),
     /// [`rtv_begin`].
     pub begin: unsafe extern "C" fn(*mut RtvBridge) -> i32,
     /// [`rtv_surface`].

@@ -36,22 +36,33 @@ static PROGRAM_OPTIONS: Mutex<OptionValues> = Mutex::new(BTreeMap::new());
 /// The options of the process, for callers without a bridge.
 static PROCESS_OPTIONS: Mutex<EffectiveOptions> = Mutex::new(EffectiveOptions::NONE);
 
-/// VTK's version, as set by [`set_host`]: major in the upper half; 0 when unknown.
+/// VTK's version as set by [`set_host`] and packed by [`packed`]; 0 when unknown.
 static HOST: AtomicU64 = AtomicU64::new(0);
 
-pub(super) fn set_host(major: u32, minor: u32) {
-    HOST.store(u64::from(major) << 32 | u64::from(minor), Ordering::Relaxed);
+pub(super) fn set_host(major: u32, minor: u32, build: u32) {
+    HOST.store(packed(major, minor, build), Ordering::Relaxed);
 }
 
-/// Options that follow VTK's version, if it is known. Shaders of versions after 9.2 draw edges only
-/// on the surface itself.
+/// Major, minor and build number of a version in one word, of 16, 16 and 32 bits. Builds between
+/// releases are numbered by their day, 20240617, which needs 25 bits.
+fn packed(major: u32, minor: u32, build: u32) -> u64 {
+    let [major, minor] = [major, minor].map(|n| u64::from(n.min(0xffff)));
+    major << 48 | minor << 32 | u64::from(build)
+}
+
+/// Builds with numbers from here on are days between two releases: 9.3.20240617 comes after 9.3.0
+/// and 9.3.1.
+const FIRST_DAY: u64 = 19_000_000;
+
+/// Options that follow VTK's version, if it is known. Shaders after the releases 9.3 draw edges
+/// only on the surface itself (ParaView 5.13, which has VTK 9.3.20240617, too).
 fn host_options(host: u64) -> Vec<(String, String)> {
-    let (major, minor) = (host >> 32, host & 0xffff_ffff);
+    let (major, minor, build) = (host >> 48, host >> 32 & 0xffff, host & 0xffff_ffff);
     let mut options = Vec::new();
     if (major, minor) > (0, 0) {
         options.push(("RTV_VTK".to_owned(), format!("{major}.{minor}")));
     }
-    if (major, minor) > (9, 2) {
+    if (major, minor) > (9, 3) || (major, minor) == (9, 3) && build >= FIRST_DAY {
         options.push(("RTV_EDGES".to_owned(), "0".to_owned()));
     }
     options
@@ -299,21 +310,22 @@ mod tests {
 
     #[test]
     fn edges_follow_the_version_of_vtk_unless_set() {
-        let of = |major: u64, minor: u64| {
-            let (options, faults) = Options::parse(host_options(major << 32 | minor));
+        let of = |major, minor, build| {
+            let (options, faults) = Options::parse(host_options(packed(major, minor, build)));
             assert!(faults.is_empty(), "{faults:?}");
             (options.vtk, options.edge_reach)
         };
-        assert_eq!(of(0, 0), (Options::default().vtk, 0.25), "unknown");
-        for minor in 0..3 {
-            assert_eq!(of(9, minor.into()), ((9, minor), 0.25));
+        assert_eq!(of(0, 0, 0), (Options::default().vtk, 0.25), "unknown");
+        let moving = [(9, 0, 0), (9, 1, 0), (9, 2, 6), (9, 2, 20_220_823), (9, 3, 0), (9, 3, 1)];
+        for (major, minor, build) in moving {
+            assert_eq!(of(major, minor, build), ((major, minor), 0.25));
         }
-        for (major, minor) in [(9, 3), (9, 7), (10, 0)] {
-            assert_eq!(of(major.into(), minor.into()), ((major, minor), 0.0));
+        for (major, minor, build) in [(9, 3, 20_240_617), (9, 4, 0), (9, 7, 0), (10, 0, 0)] {
+            assert_eq!(of(major, minor, build), ((major, minor), 0.0));
         }
         let said = ("RTV_EDGES".to_owned(), "0.5".to_owned());
         assert_eq!(
-            Options::parse(host_options(9 << 32 | 5).into_iter().chain([said])).0.edge_reach,
+            Options::parse(host_options(packed(9, 5, 0)).into_iter().chain([said])).0.edge_reach,
             0.5
         );
     }

@@ -48,18 +48,16 @@ pub fn examine(layout: &Layout, variable: impl Fn(&str) -> Option<String>) -> Ve
             finding("compiler", false, format!("`{compiler}` does not run; apt-get install g++"))
         }
     });
-    let glew = ["/usr/include/GL/glew.h", "/usr/local/include/GL/glew.h"]
-        .iter()
-        .any(|p| std::path::Path::new(p).is_file());
-    out.push(if glew {
-        finding("GL/glew.h", true, "there")
-    } else {
-        finding(
-            "GL/glew.h",
-            false,
-            "missing: VTK's headers include it; apt-get install libglew-dev",
-        )
-    });
+    if let Some(f) = flavours.iter().find(|f| needs_glew(f)) {
+        let glew = ["/usr/include/GL/glew.h", "/usr/local/include/GL/glew.h"]
+            .iter()
+            .any(|p| std::path::Path::new(p).is_file());
+        let missing = format!(
+            "missing: the headers in {} include it; apt-get install libglew-dev",
+            f.include.display()
+        );
+        out.push(finding("GL/glew.h", glew, if glew { "there".to_owned() } else { missing }));
+    }
     out.push(match library() {
         Ok(path) if layout.loader_is(&path) => {
             finding("loader", true, layout.loader().display().to_string())
@@ -98,6 +96,13 @@ pub fn examine(layout: &Layout, variable: impl Fn(&str) -> Option<String>) -> Ve
     out
 }
 
+/// True where VTK's own header for OpenGL asks for the system's GLEW. VTK may bring a GLEW of its
+/// own, and since 9.4 it uses GLAD.
+fn needs_glew(f: &Flavour) -> bool {
+    let text = std::fs::read_to_string(f.include.join("vtk_glew.h")).unwrap_or_default();
+    text.contains("VTK_MODULE_USE_EXTERNAL_vtkglew 1")
+}
+
 fn of_flavour(layout: &Layout, f: &Flavour) -> Finding {
     let name = if f.is_paraview() {
         format!("ParaView {}", &f.name[2..])
@@ -127,4 +132,22 @@ fn of_flavour(layout: &Layout, f: &Flavour) -> Finding {
         _ => shim.display().to_string(),
     };
     finding(&name, true, text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn glew_is_asked_for_only_where_headers_include_it() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let include = folder.path().to_owned();
+        let vtk = Flavour { name: "9.9".to_owned(), include, libraries: "/nowhere".into() };
+        assert!(!needs_glew(&vtk), "GLAD");
+        for (number, needed) in [("0", false), ("1", true)] {
+            let text = format!("#define VTK_MODULE_USE_EXTERNAL_vtkglew {number}\n");
+            std::fs::write(vtk.include.join("vtk_glew.h"), text).expect("written");
+            assert_eq!(needs_glew(&vtk), needed);
+        }
+    }
 }

@@ -89,7 +89,19 @@ pub fn find(places: &[PathBuf]) -> (Vec<Flavour>, Vec<String>) {
     (found, faults)
 }
 
+/// True for the headers of a ParaView that is linked with the system's VTK (Debian's 6.1): they are
+/// without VTK's own, which lie in a folder of their own.
+pub fn shares_vtk(include: &Path) -> bool {
+    include.join("vtkSMProxy.h").is_file() && !include.join("vtkObjectFactory.h").is_file()
+}
+
 fn look_at(include: &Path) -> Result<Flavour, String> {
+    if shares_vtk(include) {
+        return Err("this ParaView uses the system's VTK, whose build serves it (install \
+                    libvtk9-dev); the plugin and compositing in floating point are built only for \
+                    a ParaView with its own VTK"
+            .to_owned());
+    }
     for header in ["vtkObjectFactory.h", "vtkOpenGLRenderer.h"] {
         if !include.join(header).is_file() {
             return Err(format!("there is no {header}"));
@@ -154,5 +166,9 @@ mod tests {
             faults[0].contains("no libvtkCommonCore") && faults[1].contains("vtkObjectFactory.h"),
             "{faults:?}"
         );
+        make("include/paraview-6.1/vtkSMProxy.h");
+        let split = root.path().join("include/paraview-6.1");
+        let (found, faults) = find(&[split]);
+        assert!(found.is_empty() && faults[0].contains("uses the system's VTK"), "{faults:?}");
     }
 }

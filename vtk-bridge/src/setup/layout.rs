@@ -24,6 +24,22 @@ pub struct Installed {
     pub failed: Vec<(String, String)>,
 }
 
+impl Installed {
+    /// What was done, and how to use it; `layout` is that of the installation.
+    pub fn summary(&self, layout: &Layout) -> String {
+        let prefix = self.prefix.display();
+        if self.built.is_empty() {
+            return format!("nothing was built in {prefix}: no script is ray traced");
+        }
+        format!(
+            "installed in {prefix} for VTK {}\nset VTK_AUTOLOAD_PATH={} (eval \"$(vtk-bridge env \
+             --vtk)\" does), and scripts are ray traced",
+            self.built.join(", "),
+            layout.autoload().display()
+        )
+    }
+}
+
 impl Layout {
     /// An installation in `prefix`.
     pub fn at(prefix: PathBuf) -> Layout {
@@ -163,4 +179,23 @@ pub fn library() -> Result<PathBuf, SetupError> {
         .filter(|p| p.is_file())
         .max_by_key(age)
         .ok_or(SetupError::NoLibrary { program })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_installation_that_built_nothing_does_not_say_that_scripts_are_traced() {
+        let layout = Layout::at("/p".into());
+        let of = |built: &[&str]| {
+            let built = built.iter().map(|s| (*s).to_owned()).collect();
+            let failed = vec![("9.9".to_owned(), "an error".to_owned())];
+            Installed { prefix: "/p".into(), built, failed }.summary(&layout)
+        };
+        assert_eq!(of(&[]), "nothing was built in /p: no script is ray traced");
+        let some = of(&["9.1"]);
+        assert!(some.starts_with("installed in /p for VTK 9.1\n"), "{some}");
+        assert!(some.ends_with("scripts are ray traced"), "{some}");
+    }
 }

@@ -148,6 +148,7 @@ macro_rules! scripts {
 
 scripts! {
     annotations_stay_opengl_in_the_same_image: "annotations",
+    smoothed_images_stay_smooth: "antialiased",
     back_faces_are_as_in_stock_vtk: "backfaces",
     data_that_changes_is_drawn_as_it_is_now: "changing",
     clipping_planes_cut_as_in_stock_vtk: "clipping",

@@ -7,6 +7,7 @@ def view(size):
     """A view without antialiasing and without the axes in its corner."""
     made = CreateRenderView()
     made.ViewSize = size
+    # Edges are compared pixel by pixel; `vtk/antialiased.py` compares images that are smoothed.
     made.UseFXAA = 0
     made.OrientationAxesVisibility = 0
     # Disable reduced images during interaction.
