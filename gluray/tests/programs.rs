@@ -534,24 +534,54 @@ fn modes_beyond_match_keep_clipping_planes_and_say_what_paths_leave_out() {
     }
 }
 
+/// Mesa writes every error of a call to stderr when `MESA_DEBUG` is set, whoever made the call and
+/// whoever has taken the error since.
+#[test]
+fn no_call_of_ours_is_an_error_in_contexts_without_fixed_function() {
+    let Some(python) = program("RTSV_PYTHON") else { return };
+    let Some(x) = Xvfb::start() else { return };
+    let file = script("wheel_scene.py");
+    let errors = |through: Option<&[&str]>, kind: &str| {
+        let place = folder();
+        let home = place.path().to_str().expect("UTF-8").to_owned();
+        let environment = [("HOME", home.as_str()), ("MESA_DEBUG", "1")];
+        let run = Run { x: &x, folder: place.path(), through, environment: &environment };
+        let (output, report) = run.program(&python, &[file.as_str(), kind]);
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        let lines = text.lines().filter(|l| l.contains("User error")).map(str::to_owned);
+        (lines.collect::<Vec<_>>(), report)
+    };
+    for kind in ["plain", "pictures", "images", "peeled"] {
+        let (native, _) = errors(None, kind);
+        let (ours, report) = errors(Some(&[]), kind);
+        assert_eq!(ours, native, "{kind}");
+        assert!(report.traced_draws > 0, "{kind}");
+    }
+}
+
 #[test]
 fn passing_everything_changes_no_pixel() {
     let Some(gmsh) = program("RTSV_GMSH") else { return };
     let Some(x) = Xvfb::start() else { return };
     let lines = "Merge \"s.stl\";\nGeneral.GraphicsWidth=400; General.GraphicsHeight=400; \
                  General.MenuWidth=0;\nDraw;\nPrint \"out.png\";\nExit;\n";
-    let picture = |through: Option<&[&str]>| {
+    let picture = |through: Option<&[&str]>, more: &[(&str, &str)]| {
         let place = folder();
         write_stl(&place.path().join("s.stl"));
         std::fs::write(place.path().join("s.geo"), lines).expect("a temporary file");
-        let environment = [("HOME", place.path().to_str().expect("UTF-8"))];
+        let home = ("HOME", place.path().to_str().expect("UTF-8"));
+        let environment: Vec<_> = more.iter().copied().chain([home]).collect();
         let run = Run { x: &x, folder: place.path(), through, environment: &environment };
         run.program(&gmsh, &["s.geo"]);
         Picture::read(&place.path().join("out.png"))
     };
-    let native = picture(None);
+    let native = picture(None, &[]);
     for via in ["vendor", "preload"] {
-        let ours = picture(Some(&["--mode", "off", "--via", via]));
+        let ours = picture(Some(&["--mode", "off", "--via", via]), &[]);
         assert!(native.pixels == ours.pixels, "pixels differ by way of {via}");
+        // With `off` nothing comes to us. A refused shader makes us pass what has come.
+        let refused = [("GLURAY_INJECT_FAULT", "shader")];
+        let ours = picture(Some(&["--via", via]), &refused);
+        assert!(native.pixels == ours.pixels, "pixels that are passed differ by way of {via}");
     }
 }

@@ -80,10 +80,17 @@ const FIRST_SEGMENT: u32 = 0x4000_0000;
 const DEEPEST: u32 = 64;
 
 impl Context {
+    /// True when lists are the driver's from now on, and ours are only executed.
+    fn leaves_lists_to_driver(&self) -> bool {
+        self.bypassed || crate::faults::happened()
+    }
+
     pub(crate) fn new_list(&mut self, name: u32, mode: u32) -> bool {
-        if crate::faults::happened() {
+        if self.leaves_lists_to_driver() {
             // The name now belongs to the driver.
-            self.shared.lists().lists.remove(&name);
+            let mut lists = self.shared.lists();
+            lists.lists.remove(&name);
+            lists.greatest = lists.greatest.max(name);
             return false;
         }
         if self.capture.immediate_target == ImmediateModeTarget::Trace {
@@ -150,7 +157,7 @@ impl Context {
         if self.capture.recording.is_some() {
             return self.capture.list_op(ListOp::Call(name));
         }
-        if crate::faults::happened() {
+        if self.leaves_lists_to_driver() {
             return self.execute_in_driver(name);
         }
         let known = self.shared.lists().lists.get(&name).cloned();
@@ -410,7 +417,10 @@ impl Context {
 
     pub(crate) fn call_lists(&mut self, kind: u32, names: &[u8]) -> bool {
         let Some(names) = names::decode(kind, names) else { return false };
-        if crate::faults::happened() {
+        if self.bypassed && self.shared.lists().lists.is_empty() {
+            return false;
+        }
+        if self.leaves_lists_to_driver() {
             let base = gl::word(LIST_BASE);
             names.into_iter().for_each(|n| self.execute_in_driver_or_call(base.wrapping_add(n)));
             return true;
@@ -469,6 +479,15 @@ impl Context {
             r.begin_segment();
         }
         Some(first)
+    }
+
+    /// The driver has given these names while nothing was done. Those given later are greater.
+    pub(crate) fn note_names(&mut self, first: u32, n: i32) {
+        if self.bypassed && first != 0 {
+            let last = first.saturating_add(n.max(1).cast_unsigned() - 1);
+            let mut lists = self.shared.lists();
+            lists.greatest = lists.greatest.max(last.min(FIRST_SEGMENT - 1));
+        }
     }
 
     /// Removes our part. The driver then deletes its own.

@@ -29,6 +29,8 @@ pub(crate) struct TextureCache {
     /// The memory of a dropped image. A program that replaces a texture in each frame uses the same
     /// size again.
     spare: Vec<[u8; 4]>,
+    /// The context has no fixed function: textures have no luminance and units no bias.
+    pub(crate) core: bool,
     /// The number of images read from the driver.
     pub(crate) read: u64,
 }
@@ -56,7 +58,7 @@ impl TextureCache {
                 }
             }
         }
-        let image = read_bound(target, name, &mut self.spare).map(Arc::new);
+        let image = read_bound(target, name, self.core, &mut self.spare).map(Arc::new);
         self.read += u64::from(image.is_some());
         self.images.insert((target, name), (version, image.clone()));
         image
@@ -64,13 +66,13 @@ impl TextureCache {
 }
 
 /// Reads a texture by its name. Another texture may be bound by now.
-fn read_bound(target: u32, name: u32, spare: &mut Vec<[u8; 4]>) -> Option<Image> {
+fn read_bound(target: u32, name: u32, core: bool, spare: &mut Vec<[u8; 4]>) -> Option<Image> {
     let bound =
         gl::word(if target == TEXTURE_1D { TEXTURE_BINDING_1D } else { TEXTURE_BINDING_2D });
     if bound != name {
         gl::bind_texture(target, name);
     }
-    let image = gl::with_raw_pixel_reads(|plainly| read(plainly, target, spare));
+    let image = gl::with_raw_pixel_reads(core, |plainly| read(plainly, target, core, spare));
     if bound != name {
         gl::bind_texture(target, bound);
     }
@@ -87,7 +89,12 @@ const COMPONENT_SIZES: [u32; 6] = [
     TEXTURE_INTENSITY_SIZE,
 ];
 
-fn read(plainly: &gl::RawPixelTransfer, target: u32, spare: &mut Vec<[u8; 4]>) -> Option<Image> {
+fn read(
+    plainly: &gl::RawPixelTransfer,
+    target: u32,
+    core: bool,
+    spare: &mut Vec<[u8; 4]>,
+) -> Option<Image> {
     let of_level = |n: i32, what| gl::tex_level_i::<1>(target, n, what)[0];
     let size =
         |n: i32| [TEXTURE_WIDTH, TEXTURE_HEIGHT].map(|what| of_level(n, what).max(0) as usize);
@@ -98,7 +105,8 @@ fn read(plainly: &gl::RawPixelTransfer, target: u32, spare: &mut Vec<[u8; 4]>) -
         return None;
     }
     let format = of_level(first, TEXTURE_INTERNAL_FORMAT).cast_unsigned();
-    let filters = filters(target, parameter(TEXTURE_MIN_FILTER), parameter(TEXTURE_MAG_FILTER));
+    let [min, mag] = [TEXTURE_MIN_FILTER, TEXTURE_MAG_FILTER].map(parameter);
+    let filters = filters(target, core, min, mag);
     // A texture is complete when all levels exist, in one format, down to one texel or to the last
     // allowed level.
     let smallest = first + width.max(height).ilog2().cast_signed();
@@ -118,7 +126,10 @@ fn read(plainly: &gl::RawPixelTransfer, target: u32, spare: &mut Vec<[u8; 4]>) -
     }
     // Signed components have other quantisation steps.
     let signed = matches!(format, RED_SNORM..=RGBA16_SNORM | ALPHA_SNORM..=INTENSITY16_SNORM);
-    let sizes = COMPONENT_SIZES.map(|what| of_level(first, what));
+    let sizes = COMPONENT_SIZES.map(|what| match what {
+        TEXTURE_LUMINANCE_SIZE | TEXTURE_INTENSITY_SIZE if core => 0,
+        _ => of_level(first, what),
+    });
     let whole = !signed && sizes.iter().all(|bits| matches!(bits, 0 | 8));
     // Decoded before filtering, as in the driver.
     let encoded = matches!(format, SRGB..=COMPRESSED_SRGB_ALPHA_S3TC_DXT5)
@@ -159,8 +170,12 @@ fn decoded(v: f32) -> f32 {
 }
 
 /// The filters of the bound texture and its unit.
-fn filters(target: u32, min: u32, mag: u32) -> Filters {
+fn filters(target: u32, core: bool, min: u32, mag: u32) -> Filters {
     let one = |what| gl::tex_parameter_f::<1>(target, what)[0];
+    let of_unit = match core {
+        true => 0.0,
+        false => gl::tex_env_f::<1>(TEXTURE_FILTER_CONTROL, TEXTURE_LOD_BIAS)[0],
+    };
     Filters {
         mag_linear: mag == LINEAR,
         min_linear: matches!(min, LINEAR | LINEAR_MIPMAP_NEAREST | LINEAR_MIPMAP_LINEAR),
@@ -169,8 +184,7 @@ fn filters(target: u32, min: u32, mag: u32) -> Filters {
             NEAREST_MIPMAP_NEAREST | LINEAR_MIPMAP_NEAREST => Mip::Nearest,
             _ => Mip::Linear,
         },
-        bias: one(TEXTURE_LOD_BIAS)
-            + gl::tex_env_f::<1>(TEXTURE_FILTER_CONTROL, TEXTURE_LOD_BIAS)[0],
+        bias: one(TEXTURE_LOD_BIAS) + of_unit,
         lod: [one(TEXTURE_MIN_LOD), one(TEXTURE_MAX_LOD)],
     }
 }

@@ -168,6 +168,11 @@ pub(crate) fn commutes(s: &Snapshot) -> bool {
         && (s.render_mode == RENDER || s.render_mode == 0)
 }
 
+/// True when a fragment is drawn only at exactly the depth that is there, or anywhere else.
+pub(crate) fn compares_depths_exactly(s: &Snapshot) -> bool {
+    s.depth_test && matches!(s.depth_func, EQUAL | NOTEQUAL)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -392,8 +392,8 @@ pub(crate) fn reset_pixel_transfer() {
 }
 
 /// Runs `f` while texels are read without conversion: in consecutive rows, into memory and not into
-/// a buffer, without the program's scales and biases.
-pub(crate) fn with_raw_pixel_reads<R>(f: impl FnOnce(&RawPixelTransfer) -> R) -> R {
+/// a buffer, without the program's scales and biases, for which `core` contexts must not be asked.
+pub(crate) fn with_raw_pixel_reads<R>(core: bool, f: impl FnOnce(&RawPixelTransfer) -> R) -> R {
     // Volumes have more parameters and are not read.
     const PACK: [(u32, i32); 5] = [
         (PACK_SWAP_BYTES, 0),
@@ -403,10 +403,11 @@ pub(crate) fn with_raw_pixel_reads<R>(f: impl FnOnce(&RawPixelTransfer) -> R) ->
         (PACK_ALIGNMENT, 4),
     ];
     let pack = PACK.map(|(what, plain)| (what, plain, int(what)));
-    let transfer = TRANSFER.map(|(what, plain)| (what, plain, floats::<1>(what)[0]));
-    // A context without fixed function has none of these and answers 0 for all.
-    let none = transfer.iter().all(|t| t.2 == 0.0);
-    let transfer = transfer.map(|(what, plain, now)| (what, if none { now } else { plain }, now));
+    let fixed = TRANSFER.iter().filter(|_| !core);
+    let mut transfer: Vec<_> = fixed.map(|(what, v)| (*what, *v, floats::<1>(*what)[0])).collect();
+    // OpenGL ES has none either and answers 0 for all.
+    let any = transfer.iter().any(|t| t.2 != 0.0);
+    transfer.retain(|_| any);
     let buffer = word(PIXEL_PACK_BUFFER_BINDING);
     pack.iter().filter(|p| p.1 != p.2).for_each(|p| pixel_storei(p.0, p.1));
     transfer.iter().filter(|p| p.1 != p.2).for_each(|p| pixel_transferf(p.0, p.1));
@@ -432,9 +433,9 @@ pub(crate) fn buffer_bytes(target: u32, at: usize, bytes: usize) -> Vec<u8> {
 }
 
 /// The depths of the framebuffer from its lower left corner, row by row.
-pub(crate) fn depths(w: i32, h: i32) -> Vec<f32> {
+pub(crate) fn depths(core: bool, w: i32, h: i32) -> Vec<f32> {
     let mut out = vec![1.0_f32; w.max(0) as usize * h.max(0) as usize];
-    with_raw_pixel_reads(|_| {
+    with_raw_pixel_reads(core, |_| {
         read_pixels(0, 0, w.max(0), h.max(0), DEPTH_COMPONENT, FLOAT, out.as_mut_ptr().cast())
     });
     out

@@ -19,8 +19,10 @@ pub struct Report {
     pub program: String,
     /// Its process id.
     pub pid: u32,
-    /// Mode.
+    /// Mode; `off` where nothing is traced.
     pub mode: String,
+    /// True when every primitive was to be traced (`--trace all`).
+    pub trace_all: bool,
     /// The driver's renderer and version.
     pub driver: String,
     /// Frames: buffer swaps, and read-backs of traced draws.
@@ -226,6 +228,11 @@ fn write_spans(file: &Path) {
 static SLOTS: Mutex<Vec<Report>> = Mutex::new(Vec::new());
 
 impl Counters {
+    /// True once the driver's name is known.
+    pub(crate) fn knows_driver(&self) -> bool {
+        !self.report.driver.is_empty()
+    }
+
     pub(crate) fn set_driver(&mut self, renderer: &str, version: &str) {
         self.report.driver = format!("{renderer}, {version}");
     }
@@ -340,7 +347,9 @@ fn write(dir: &Path) {
     SLOTS.lock().unwrap_or_else(|e| e.into_inner()).iter().for_each(|s| sum.add(s));
     sum.program = crate::host::config::program_name();
     sum.pid = std::process::id();
-    sum.mode = crate::host::config::current().settings.mode.name().to_owned();
+    let settings = &crate::host::config::current().settings;
+    sum.trace_all = settings.trace == crate::host::config::Trace::All;
+    sum.mode = if settings.enabled { settings.mode.name() } else { "off" }.to_owned();
     sum.faults = crate::faults::messages();
     sum.problems.extend(crate::host::config::current().problems.iter().cloned());
     sum.ranks = crate::cluster::rank_stats();

@@ -8,7 +8,7 @@
 //! taken it. In between, another thread may make it current and must find it.
 
 use crate::calls::{self, class};
-use crate::capture::Capture;
+use crate::capture::{Capture, ImmediateModeTarget};
 use crate::classify::Classifier;
 use crate::host::config::Config;
 use crate::host::report::Counters;
@@ -33,6 +33,10 @@ pub(crate) struct Context {
     pub(crate) errors: KeptErrors,
     /// A fault of ours has ended the tracing, and the driver knows everything that was held back.
     pub(crate) tracing_stopped: bool,
+    /// Tracing has been off since the context was made: every call is the driver's, untouched.
+    /// Ends when the panel switches the tracing on. Meanwhile immediate mode counts as passed
+    /// ([`ImmediateModeTarget::Pass`]), which is its shortest way to the driver.
+    pub(crate) bypassed: bool,
     pub(crate) capabilities: DriverCapabilities,
     pub(crate) config: Arc<Config>,
     pub(crate) state: StateCache,
@@ -208,17 +212,24 @@ impl Drop for Context {
 
 impl Context {
     fn new(handle: usize, group: ShareGroup, seen_created: bool) -> Context {
+        let config = crate::host::config::current();
+        let bypassed = !config.settings.enabled;
+        let mut capture = Capture::default();
+        if bypassed {
+            capture.immediate_target = ImmediateModeTarget::Pass;
+        }
         Context {
             handle,
             destroyed_while_current: false,
             watched_calls: 0,
             errors: KeptErrors::default(),
             tracing_stopped: false,
+            bypassed,
             capabilities: DriverCapabilities::default(),
-            config: crate::host::config::current(),
+            config,
             state: StateCache::default(),
             attributes: AttributeState::default(),
-            capture: Capture::default(),
+            capture,
             shared: SharedObjects::new(group, seen_created),
             classifier: Classifier::default(),
             presentation: Presentation::default(),

@@ -25,6 +25,8 @@ pub(crate) struct Frame {
     traced: bool,
     /// The framebuffers and viewports of the traced draws.
     places: Vec<(u32, [i32; 4])>,
+    /// The framebuffers with depths that the driver has drawn since they were cleared.
+    drivers_depths: Vec<u32>,
     /// The highest row that window viewports reached in the previous frame and in this one.
     tops: [i32; 2],
 }
@@ -72,6 +74,29 @@ impl Frame {
     /// The driver drew lines or points whose order does not matter but for ties.
     pub(crate) fn driver_drew(&mut self) {
         self.others |= !self.pending.is_empty();
+    }
+
+    // ---- Who drew the depths --------------------------------------------------------------------
+    /// The driver draws depths into a framebuffer.
+    pub(crate) fn driver_draws_depth(&mut self, framebuffer: u32) {
+        if !self.drivers_depths.contains(&framebuffer) {
+            self.drivers_depths.push(framebuffer);
+        }
+    }
+
+    /// The depths of a framebuffer are cleared.
+    pub(crate) fn depth_cleared(&mut self, framebuffer: u32) {
+        self.drivers_depths.retain(|f| *f != framebuffer);
+    }
+
+    /// True when the driver has drawn depths anywhere.
+    pub(crate) fn has_drivers_depths(&self) -> bool {
+        !self.drivers_depths.is_empty()
+    }
+
+    /// True when the driver has drawn depths into this framebuffer.
+    pub(crate) fn has_drivers_depths_in(&self, framebuffer: u32) -> bool {
+        self.drivers_depths.contains(&framebuffer)
     }
 
     // ---- What was traced ------------------------------------------------------------------------

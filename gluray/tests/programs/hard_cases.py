@@ -3,6 +3,7 @@ floats, bottom row first."""
 from gl_by_ctypes import *
 from mode_scenes import *
 from texture_scenes import *
+from view_scenes import *
 
 
 def plain():

@@ -72,6 +72,13 @@ impl ListRecording {
         self.used = true;
     }
 
+    /// True while attributes belong to the driver's segment: state was changed there and no
+    /// primitive has come since. Mesa's material depends on the order of `glColorMaterial` and
+    /// colours in one list, and splitting the list would change that order.
+    fn attributes_are_the_drivers(&self) -> bool {
+        self.used && self.more && !self.open
+    }
+
     /// Adds a step of ours. Calls that went to the driver before it end their segment.
     fn push(&mut self, op: ListOp) {
         if self.used {
@@ -110,6 +117,15 @@ impl Capture {
         true
     }
 
+    /// The same for an attribute; false when the driver compiles it.
+    fn list_attribute(&mut self, op: ListOp) -> bool {
+        let Some(r) = self.recording.as_mut().filter(|r| !r.attributes_are_the_drivers()) else {
+            return false;
+        };
+        r.push(op);
+        true
+    }
+
     pub(crate) fn list_begin(&mut self, mode: u32) -> bool {
         if let Some(r) = &mut self.recording {
             (r.open, r.mode) = (true, mode);
@@ -135,19 +151,21 @@ impl Capture {
     }
 
     pub(crate) fn list_normal(&mut self, v: [f32; 3]) -> bool {
-        self.list_op(ListOp::Normal(v))
+        self.list_attribute(ListOp::Normal(v))
     }
 
     pub(crate) fn list_color(&mut self, v: [f32; 4]) -> bool {
-        self.list_op(ListOp::Color(v))
+        self.list_attribute(ListOp::Color(v))
     }
 
     pub(crate) fn list_tex(&mut self, v: [f32; 4]) -> bool {
-        self.list_op(ListOp::Tex(v))
+        self.list_attribute(ListOp::Tex(v))
     }
 
     pub(crate) fn list_material(&mut self, face: u32, what: u32, v: [f32; 4]) -> bool {
-        let Some(r) = &mut self.recording else { return false };
+        let Some(r) = self.recording.as_mut().filter(|r| !r.attributes_are_the_drivers()) else {
+            return false;
+        };
         let at = r.list.materials.len() as u32;
         r.list.materials.push((face, what, v));
         self.list_op(ListOp::Material(at))

@@ -139,8 +139,11 @@ fn limit(program: u32) -> Option<DepthLimits> {
     let (width, height) = (size(TEXTURE_WIDTH), size(TEXTURE_HEIGHT));
     let fits = width * height > 0 && width * height <= 1 << 26;
     let depth = fits.then(|| {
+        // VTK needs OpenGL 3.2, which knows profiles.
+        let core = gl::int(CONTEXT_PROFILE_MASK) & 1 != 0;
         // The program may want its own pixels packed in any way.
-        let texels = gl::with_raw_pixel_reads(|plainly| gl::tex_image_rgba(plainly, TEXTURE_2D, 0));
+        let read = |plainly: &gl::RawPixelTransfer| gl::tex_image_rgba(plainly, TEXTURE_2D, 0);
+        let texels = gl::with_raw_pixel_reads(core, read);
         texels.into_iter().map(|t| t[1]).collect::<Vec<f32>>()
     });
     let depth = depth.filter(|d| d.len() == width * height);

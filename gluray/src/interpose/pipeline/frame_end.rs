@@ -2,6 +2,7 @@
 
 use crate::calls::{at, class};
 use crate::capture::ImmediateModeTarget;
+use crate::driver::gl;
 use crate::enums::*;
 use crate::host::config::{self, Quality};
 use crate::interpose::context::Context;
@@ -40,9 +41,12 @@ impl Context {
     }
 
     /// Applies new settings. They hold from the next frame on.
-    fn apply_new_settings(&mut self) {
+    pub(super) fn apply_new_settings(&mut self) {
         let config = config::current();
         if !Arc::ptr_eq(&config, &self.config) {
+            if self.bypassed && config.settings.enabled {
+                self.end_bypass();
+            }
             self.config = config;
             // Classifications depend on settings.
             self.state.dirty = class::ALL;
@@ -112,6 +116,16 @@ impl Context {
             }
         }
         self.attributes.sync();
+        if mask & DEPTH_BUFFER_BIT != 0
+            && self.presentation.frame.has_drivers_depths()
+            && !gl::is_enabled(SCISSOR_TEST)
+        {
+            let bound = match self.capabilities.version {
+                30.. => gl::word(FRAMEBUFFER_BINDING),
+                _ => 0,
+            };
+            self.presentation.frame.depth_cleared(bound);
+        }
         false
     }
 }

@@ -45,6 +45,10 @@ use crate::watched_calls;
 use std::sync::Arc;
 use std::time::Instant;
 
+/// Why the driver draws what is tested for equality with depths of its own: those of rays agree
+/// with them to some steps of the buffer only.
+const EQUAL_DEPTHS: &str = "a test for equal depth after draws of the driver";
+
 /// After so many watched calls without a draw, the next ones are not reported.
 const ENOUGH_WATCHED_CALLS: u32 = 12;
 
@@ -54,13 +58,38 @@ impl Context {
         self.state.dirty = class::ALL;
         self.shared.on_made_current();
         self.attributes.on_made_current();
-        if self.capabilities.version == 0 {
-            self.errors.keep();
-            self.capabilities = DriverCapabilities::query();
+        if !self.counters.knows_driver() {
             // As large as the window until the program says otherwise.
             self.presentation.frame.set_initial_height(gl::ints(SCISSOR_BOX));
-            KeptErrors::drop_ours();
             self.counters.set_driver(&gl::string(RENDERER), &gl::string(VERSION));
+        }
+        if self.capabilities.version == 0 && !self.bypassed {
+            self.capabilities = self.errors.hiding(DriverCapabilities::query);
+            self.capture.textures.core = self.capabilities.core;
+        }
+    }
+
+    /// The panel has switched the tracing on, which was off since the context was made. Nothing is
+    /// known of what the program has done. Lists that it has compiled stay the driver's.
+    pub(crate) fn end_bypass(&mut self) {
+        self.bypassed = false;
+        self.capture.immediate_target = ImmediateModeTarget::Outside;
+        self.on_made_current();
+        self.mark(class::ALL);
+    }
+
+    /// A call that may change state, while nothing is done: the frames are counted, and others
+    /// that share textures are told.
+    fn call_while_bypassed(&mut self, index: usize, classes: u8) {
+        self.shared.observe_call(index, classes);
+        self.shared.mark(classes);
+        if calls::swaps_buffers(index) {
+            self.frame_done();
+        } else if calls::reads_frame(index) {
+            self.apply_new_settings();
+        }
+        if self.bypassed {
+            watched_calls::disarm();
         }
     }
 
@@ -87,6 +116,10 @@ impl Context {
     /// A call is about to run that may change `classes` of state. `flushes`: pending draws must be
     /// in the framebuffer before it. `draws`: the driver draws in it.
     pub(crate) fn watched_call(&mut self, index: usize, classes: u8, flushes: bool, draws: bool) {
+        if self.bypassed {
+            self.call_while_bypassed(index, classes);
+            return;
+        }
         if self.capture.immediate_target == ImmediateModeTarget::Trace {
             self.replay_to_driver("another call between Begin and End");
         }
@@ -105,6 +138,7 @@ impl Context {
             }
             if draws && !compiling {
                 self.counters.count_driver_draws("a draw call that is not followed", 1);
+                self.presentation.frame.driver_draws_depth(self.state.snapshot.framebuffer);
             }
             if calls::swaps_buffers(index) {
                 self.frame_done();
@@ -188,8 +222,14 @@ impl Context {
 
     fn classification_of_state(&mut self) -> Classification {
         let filter = TraceFilter::of(&self.config.settings);
-        match rules::classify(&self.state.snapshot, filter) {
+        let s = &self.state.snapshot;
+        match rules::classify(s, filter) {
             Classification::Pass(why) => Classification::Pass(why),
+            _ if rules::compares_depths_exactly(s)
+                && self.presentation.frame.has_drivers_depths_in(s.framebuffer) =>
+            {
+                Classification::Pass(EQUAL_DEPTHS)
+            }
             classification => match self.check_presenter() {
                 Ok(()) => classification,
                 Err(why) => Classification::Pass(why),
@@ -278,6 +318,10 @@ impl Context {
         }
         self.attributes.sync();
         self.counters.count_driver_draws(why, 1);
+        let s = &self.state.snapshot;
+        if s.depth_test && s.depth_mask {
+            self.presentation.frame.driver_draws_depth(s.framebuffer);
+        }
     }
 
     /// The driver is about to execute lists of its own, which may draw or change textures.
@@ -293,6 +337,8 @@ impl Context {
             } else {
                 self.flush(FlushReason::DriverList);
             }
+            // Whether the list switches depths off is not known.
+            self.presentation.frame.driver_draws_depth(self.state.snapshot.framebuffer);
         }
         self.attributes.sync();
         self.state.dirty = class::ALL;
@@ -314,6 +360,9 @@ impl Context {
     /// they still can be sent, and the driver is told what it does not know. Between Begin and End
     /// of a primitive that the driver draws none of this is possible, so it waits.
     pub(crate) fn stop_tracing(&mut self) {
+        if self.bypassed {
+            self.tracing_stopped = true;
+        }
         if self.tracing_stopped || self.capture.immediate_target == ImmediateModeTarget::Pass {
             return;
         }

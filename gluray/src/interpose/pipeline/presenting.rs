@@ -335,7 +335,8 @@ impl Context {
         if width * height == 0 || width * height > 1 << 26 {
             return;
         }
-        let depth = self.errors.hiding(|| gl::depths(width as i32, height as i32));
+        let core = self.capabilities.core;
+        let depth = self.errors.hiding(|| gl::depths(core, width as i32, height as i32));
         let limit = trace::DepthLimits { width, height, depth, exact: true };
         let start = Instant::now();
         let (sums, rays, structures) =

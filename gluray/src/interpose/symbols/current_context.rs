@@ -161,8 +161,8 @@ pub(super) fn fast_call(
 }
 
 /// The slow path of a call: runs `f` with the current context. `f` returns whether it has handled
-/// the call. Without a context and after a fault the result is false, and the driver is to be
-/// called.
+/// the call. Without a context, after a fault, and while the context is bypassed the result is
+/// false, and the driver is to be called.
 #[inline(always)]
 pub(super) fn with(index: usize, f: impl FnOnce(&mut Context) -> bool) -> bool {
     if crate::faults::happened() {
@@ -171,7 +171,7 @@ pub(super) fn with(index: usize, f: impl FnOnce(&mut Context) -> bool) -> bool {
     }
     let call = || {
         crate::faults::inject_at(index);
-        with_context(f)
+        with_context(|c| !c.bypassed && f(c))
     };
     match crate::faults::caught(call) {
         Some(handled) => handled.unwrap_or(false),

@@ -280,7 +280,11 @@ pub(in crate::interpose::symbols) unsafe extern "C" fn glGenLists(n: Int) -> u32
         with_context(|c| c.gen_lists(n))
     };
     let given = caught(give).flatten().flatten();
-    given.unwrap_or_else(|| driver!(glGenLists(n): (Int) -> u32))
+    given.unwrap_or_else(|| {
+        let first = driver!(glGenLists(n): (Int) -> u32);
+        caught(|| with_context(|c| c.note_names(first, n)));
+        first
+    })
 }
 
 // ---- Addresses ----------------------------------------------------------------------------------
