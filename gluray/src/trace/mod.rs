@@ -396,10 +396,11 @@ impl<'a> Prepared<'a> {
         Some(Fragment { weights, depth, plain_depth, front })
     }
 
-    /// The first visible fragment of the pixel. `ray` and `hit` belong to the pixel's centre.
+    /// The first visible fragment of the pixel. `ray` and `hit` belong to the pixel's centre; the
+    /// ray starts `shift` behind the camera's own, as do its parameters.
     fn resolve(
         &self,
-        mut ray: Ray,
+        (mut ray, shift): (Ray, f64),
         hit: Option<rt_core::ray::Hit>,
         x: i32,
         y: i32,
@@ -410,7 +411,7 @@ impl<'a> Prepared<'a> {
             if let Some(f) = self.fragment(h.prim as usize, x, y) {
                 let found = (h.prim as usize, f);
                 return Some(if f.depth > f.plain_depth {
-                    self.nearest_with_offset(found, ray, h.t, x, y)
+                    self.nearest_with_offset(found, (ray, shift), h.t, x, y)
                 } else {
                     found
                 });
@@ -418,7 +419,7 @@ impl<'a> Prepared<'a> {
             // On an edge, the fill rule may give the pixel to an adjacent triangle that the ray
             // missed.
             if step == 0
-                && let Some(found) = self.hit_beside_center(h.t, x, y)
+                && let Some(found) = self.hit_beside_center((ray, shift), h.t, x, y)
             {
                 return Some(found);
             }
@@ -434,7 +435,7 @@ impl<'a> Prepared<'a> {
     fn nearest_with_offset(
         &self,
         first: (usize, Fragment),
-        mut ray: Ray,
+        (mut ray, shift): (Ray, f64),
         t: f32,
         x: i32,
         y: i32,
@@ -442,7 +443,7 @@ impl<'a> Prepared<'a> {
         let mut best = first;
         let mut t = t;
         for _ in 0..8 {
-            let Some(limit) = self.parameter_at_depth(best.1.depth, x, y) else { break };
+            let Some(limit) = self.parameter_at_depth(best.1.depth, shift, x, y) else { break };
             (ray.t_min, ray.t_max) = (t.next_up(), limit.min(ray.t_max));
             if ray.t_min >= ray.t_max {
                 break;
@@ -459,8 +460,8 @@ impl<'a> Prepared<'a> {
         best
     }
 
-    /// The ray parameter at which the ray through a pixel's centre reaches a depth.
-    fn parameter_at_depth(&self, depth: f64, x: i32, y: i32) -> Option<f32> {
+    /// The parameter at which the ray through a pixel's centre reaches a depth, from `shift` on.
+    fn parameter_at_depth(&self, depth: f64, shift: f64, x: i32, y: i32) -> Option<f32> {
         let s = &*self.draw.state;
         let [n, f] = s.depth_range;
         let [vx, vy, vw, vh] = s.viewport.map(f64::from);
@@ -475,19 +476,31 @@ impl<'a> Prepared<'a> {
         let (a, b, aw, bw) =
             (clip.row(2).dot(o), clip.row(2).dot(d), clip.row(3).dot(o), clip.row(3).dot(d));
         let t = (z * aw - a) / (b - z * bw);
-        let (_, shift) = self.ray(f64::from(x) + 0.5, f64::from(y) + 0.5)?;
         let t = (t - shift) as f32;
         t.is_finite().then_some(t)
     }
 
-    fn hit_beside_center(&self, t: f32, x: i32, y: i32) -> Option<(usize, Fragment)> {
+    /// A fragment of a triangle that rays beside the pixel's centre hit at about the parameter `t`
+    /// of the ray through the centre.
+    fn hit_beside_center(
+        &self,
+        (center, start): (Ray, f64),
+        t: f32,
+        x: i32,
+        y: i32,
+    ) -> Option<(usize, Fragment)> {
         const OFF: f64 = 1.0 / 200.0;
+        // A thousandth of the way from the eye, or of the draw's size: rays that are moved up to
+        // the draw have come no way.
+        let radius = f64::from(self.world.bounds().radius());
+        let at = f64::from(t) + start;
+        let reach = 1e-3 * at.abs().max(radius / f64::from(center.dir.length()));
         let mut best: Option<(usize, Fragment)> = None;
         for (dx, dy) in [(-OFF, -OFF), (OFF, -OFF), (-OFF, OFF), (OFF, OFF)] {
-            let (ray, _) = self.ray(f64::from(x) + 0.5 + dx, f64::from(y) + 0.5 + dy)?;
+            let (ray, shift) = self.ray(f64::from(x) + 0.5 + dx, f64::from(y) + 0.5 + dy)?;
             self.rays.fetch_add(1, Relaxed);
             let Some(h) = self.world.closest(&ray) else { continue };
-            if (h.t - t).abs() > 1e-3 * t.abs() {
+            if (f64::from(h.t) + shift - at).abs() > reach {
                 continue;
             }
             if let Some(f) = self.fragment(h.prim as usize, x, y)

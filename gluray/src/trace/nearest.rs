@@ -158,7 +158,7 @@ fn trace_draw(
             let (prim, f) = match fragments[b].lane[l] {
                 LaneState::Empty => continue,
                 LaneState::Found if !behind => (rays.hits[b].prim[l] as usize, fragments[b].get(l)),
-                _ => match p.resolve(rays.blocks[b].get(l), rays.hits[b].get(l), px, py) {
+                _ => match p.resolve(rays.ray(b, l), rays.hits[b].get(l), px, py) {
                     Some(found) => found,
                     None => continue,
                 },

@@ -116,19 +116,21 @@ impl AffineRays {
         let bounds = p.draw.geometry.bounds();
         let (middle, radius) =
             (bounds.center().as_dvec3() - p.world.origin(), f64::from(bounds.radius()));
+        let clip = super::matrix(&p.draw.clip_from_object);
+        let (z, w) = (clip.row(2), clip.row(3));
+        let parallel = w.truncate() == DVec3::ZERO;
+        // Rays of an eye share their origin, which is exact. Parallel ones have an origin each, and
+        // its rounding is what they miss the edges of triangles by.
         let far = |(x, y): (f64, f64)| {
             let o = DVec3::from_array(self.origin.map(|a| a.at(x, y)));
             (o - middle).abs().max_element() > 64.0 * radius
         };
-        if !corners.iter().any(|c| far(*c)) {
+        if !parallel && !corners.iter().any(|c| far(*c)) {
             return 0.0;
         }
         let (x, y) = corners[0];
         let origin = DVec3::from_array(self.origin.map(|a| a.at(x, y)));
         let dir = DVec3::from_array(self.dir.map(|a| a.at(x, y)));
-        let clip = super::matrix(&p.draw.clip_from_object);
-        let (z, w) = (clip.row(2), clip.row(3));
-        let parallel = w.truncate() == DVec3::ZERO;
         // Along a ray, the parameter is w itself or (z + w) / w.
         let row = if parallel { (z + w) / w.w } else { w };
         let at = |v: DVec3| row.truncate().dot(v + p.world.origin()) + row.w;
@@ -188,9 +190,11 @@ impl AffineRays {
             none |= (b.simd_eq(zero) & a.simd_lt(zero)).to_bitmask();
         }
         // Rays of a parallel projection start at the program's near plane. Another plane in front
-        // of it may come first.
+        // of it may come first, also by the slack of the near plane itself. That counts only where
+        // the scene does not begin far behind all of them.
         let before = t0.simd_lt(zero) & t0.simd_gt(before_all);
-        let back = before.select(t0, splat(self.start));
+        let start = splat(self.start);
+        let back = (before & start.simd_eq(zero)).select(t0, start);
         let (mut origin, mut dir) = ([zero; 3], [zero; 3]);
         for k in 0..3 {
             dir[k] = self.dir[k].row(px, py);
@@ -250,6 +254,11 @@ impl TileRays {
             .expect("one block of hits for each of rays");
         p.rays.fetch_add(area.w as u64 * area.h as u64, Relaxed);
         self.hits.iter().any(|h| h.prim.iter().any(|p| *p != rt_core::ray::NO_HIT))
+    }
+
+    /// The ray of lane `l` of block `b`, and how far it starts behind the camera's own.
+    pub(super) fn ray(&self, b: usize, l: usize) -> (Ray, f64) {
+        (self.blocks[b].get(l), self.shift[b][l])
     }
 
     /// Traces the range behind first hits that polygon offset moved back, up to the depth of the
