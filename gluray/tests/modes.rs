@@ -70,6 +70,35 @@ fn path_mode_has_shadows_and_light_from_wall_to_wall_and_is_deterministic() {
 }
 
 #[test]
+fn rich_is_lit_where_the_model_view_turns_the_view_over() {
+    let rich = ["--mode", "rich", "--set", "effects.ambient_occlusion_samples=32"];
+    let Some((before, _)) = draw("box_on_floor_parallel", Some(&rich)) else { return };
+    let (behind, _) = draw("viewed_from_behind", Some(&rich)).expect("it ran before");
+    let (plain, _) = draw("viewed_from_behind", Some(&["--mode", "phong"])).expect("it ran before");
+    for part in [FRONT, AWAY, SHADOW] {
+        let [before, behind] = [&before, &behind].map(|p| mean(p, part)[1]);
+        // The rays of ambient occlusion are mirrored, so they are others.
+        assert!((before - behind).abs() < 6.0, "{part:?}: {behind} from behind, {before} before");
+    }
+    let (open, unlit) = (mean(&behind, AWAY)[1], mean(&plain, AWAY)[1]);
+    assert!(open > 0.8 * unlit, "{open} of {unlit} far from the box");
+}
+
+#[test]
+fn phong_takes_normals_of_any_length_as_the_driver_does() {
+    for case in ["normals_of_length_two", "normals_of_half_length", "normals_under_a_scale"] {
+        let Some((native, _)) = draw(case, None) else { return };
+        let (phong, report) = draw(case, Some(&["--mode", "phong"])).expect("it ran before");
+        assert!(report.traced_draws > 0, "{case}");
+        // The dome's top, its sides, and its darkest part.
+        for part in [[60, 60, 8, 8], [80, 60, 6, 6], [44, 44, 6, 6]] {
+            let [a, b] = [&native, &phong].map(|p| mean(p, part)[1]);
+            assert!((a - b).abs() < 2.0, "{case} {part:?}: {b} instead of {a}");
+        }
+    }
+}
+
+#[test]
 fn fog_takes_the_same_share_of_path_traced_colours_as_of_others() {
     const FOG: [f64; 3] = [51.0, 102.0, 255.0];
     let path = ["--mode", "path", "--set", "samples=24"];

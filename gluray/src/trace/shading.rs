@@ -8,9 +8,9 @@ use crate::host::config::Mode;
 use crate::state::matrix::transform;
 use crate::state::snapshot::TextureUnit;
 use crate::trace::lighting::VertexColors;
-use crate::trace::occlusion::{RayScene, Visibility, vector};
+use crate::trace::occlusion::{Eye, RayScene, Visibility, vector};
 use crate::trace::texturing;
-use crate::trace::{Fragment, Prepared, matrix, mixed};
+use crate::trace::{Fragment, Prepared, mixed};
 use rt_core::glam::{DVec3, Mat3};
 
 impl Prepared<'_> {
@@ -30,6 +30,24 @@ impl Prepared<'_> {
         let normal =
             if self.draw.state.flat { normal(corners[2]) } else { mixed(corners.map(normal), w) };
         (mixed(eye, w), crate::trace::lighting::normalized(normal))
+    }
+
+    /// The normal that lights a fragment: the shading normal, as long as the vertices' are. OpenGL
+    /// lights with normals of any length unless it is told to normalise them (OpenGL 4.6
+    /// compatibility profile, section 12.2.1), and longer ones are brighter. Interpolation alone
+    /// would shorten those that diverge.
+    fn lit_normal(&self, prim: usize, w: [f32; 3], normal: [f32; 3]) -> [f32; 3] {
+        let corners = self.draw.geometry.mesh.indices[prim].map(|i| i as usize);
+        let length = |i: usize| {
+            let n = self.lighting.eye_normal(self.draw.attributes.normals.at(i));
+            [n.iter().map(|v| v * v).sum::<f32>().sqrt()]
+        };
+        let [length] = match self.draw.state.flat {
+            _ if self.draw.state.normalize => [1.0],
+            true => length(corners[2]),
+            false => mixed(corners.map(length), w),
+        };
+        normal.map(|v| v * length)
     }
 
     /// The matrix that takes normals from eye space to object space: the transposed model-view.
@@ -137,10 +155,12 @@ impl Prepared<'_> {
             return self.color(prim, f, per_pixel, &Visibility::FULL, Some(pixel));
         }
         let (eye, _) = self.eye_point(prim, f.weights.map(|w| w as f32));
-        let clip = matrix(&self.draw.state.projection);
-        let parallel =
-            matches!(self.draw.shading, Shading::Fixed) && clip.row(3).truncate() == DVec3::ZERO;
-        let towards = if parallel { DVec3::Z } else { -vector(eye) };
+        // Neither the origin nor the z axis of eye space: a program may place or turn the viewer
+        // by the projection, or mirror the view by the model-view.
+        let towards = match self.eye {
+            Eye::Point(at, _) => at - vector(eye),
+            Eye::Parallel(back) => back,
+        };
         self.lit_from(prim, f, mode, ray_scene, (pixel, true), towards)
     }
 
@@ -242,6 +262,7 @@ impl Prepared<'_> {
         let (mut color, secondary) = match s.flat {
             _ if per_pixel && s.lighting => {
                 let (eye, normal) = self.eye_point(prim, w);
+                let normal = self.lit_normal(prim, w, normal);
                 let color = if s.flat {
                     self.draw.attributes.colors.at(corners[2])
                 } else {
