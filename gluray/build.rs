@@ -49,21 +49,16 @@ fn class(name: &str) -> u32 {
         "glLoadName",
         "glSelectBuffer",
         "glFeedbackBuffer",
-    ]) || starts(&[
-        "glClearColor",
-        "glClearDepth",
-        "glClearStencil",
-        "glBitmap",
-        "glLineWidth",
-        "glLineStipple",
-    ]) || starts(&[
-        "glPointSize",
-        "glPixelZoom",
-        "glPixelTransfer",
-        "glPixelMap",
-        "glFlush",
-        "glFinish",
-    ]) {
+    ]) || starts(&["glClearColor", "glClearDepth", "glClearStencil", "glBitmap", "glLineWidth"])
+        || starts(&[
+            "glPointSize",
+            "glPixelZoom",
+            "glPixelTransfer",
+            "glPixelMap",
+            "glFlush",
+            "glFinish",
+        ])
+    {
         return PURE;
     }
     if any(&["glMatrixMode", "glOrtho", "glFrustum"])
@@ -165,6 +160,7 @@ fn leaves_textures(name: &str) -> bool {
         "glDepth",
         "glBlend",
         "glStencil",
+        "glLineStipple",
         "glColorMask",
         "glClipPlane",
         "glClipControl",

@@ -2,9 +2,10 @@
 
 mod common;
 
-use common::Picture;
 use common::cases::{self, Expected};
 use common::metrics::{compare, depths_beyond_edges, wrong_beyond_edges};
+use common::{Picture, Run, Xvfb, folder, peer};
+use std::path::Path;
 
 fn check(case: &str, expected: &Expected, options: &[&str]) {
     cases::check("hard_cases.py", case, expected, options);
@@ -64,6 +65,72 @@ fn the_same_by_ld_preload() {
 #[test]
 fn nothing_is_traced_when_tracing_is_off() {
     check("plain", &Expected { traced: false, exit: 0 }, &["--mode", "off"]);
+}
+
+#[test]
+fn near_and_far_planes_at_any_distance_leave_no_holes() {
+    check_all(&["near_plane_far_in_front", "near_plane_somewhat_in_front", "far_plane_far_behind"]);
+}
+
+/// Cases with lists, attributes and state between them, where splitting a list can be seen.
+const LISTS: [&str; 4] = [
+    "colour_material_twice",
+    "colour_material_twice_in_a_list",
+    "colour_material_twice_in_a_list_that_is_executed",
+    "material_before_colour_material_in_a_list",
+];
+
+#[test]
+fn colours_between_changes_of_colour_material_are_the_drivers() {
+    check_all(&LISTS);
+}
+
+/// What a case draws natively, and with what `set` of variables and options; both to the bit.
+fn assert_untouched(case: &str, options: &[&str], environment: &[(&str, &str)]) {
+    let Some(python) = peer("RTSV_SYSTEM_PYTHON") else { return };
+    let Some(x) = Xvfb::start() else { return };
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/programs/hard_cases.py");
+    let place = folder();
+    let draw = |through, environment| {
+        let run = Run { x: &x, folder: place.path(), through, environment };
+        let (output, report) =
+            run.program(&python, &[script.to_str().expect("UTF-8"), case, "out"]);
+        assert!(output.status.success() && output.stderr.is_empty(), "{case}: {output:?}");
+        (std::fs::read(place.path().join("out")).expect("a picture"), report)
+    };
+    let ((native, _), (ours, report)) = (draw(None, &[]), draw(Some(options), environment));
+    let differ = native.iter().zip(&ours).filter(|(a, b)| a != b).count();
+    assert_eq!((native.len(), differ), (ours.len(), 0), "{case}: bytes of colour and depth");
+    assert_eq!((report.traced_draws, report.mode.as_str()), (0, "off"), "{case}");
+}
+
+#[test]
+fn with_tracing_off_every_call_is_the_drivers() {
+    let others =
+        ["nested_lists", "lists_over_several_frames", "material_per_vertex", "clip_planes"];
+    for case in LISTS.iter().chain(&others) {
+        assert_untouched(case, &["--mode", "off"], &[]);
+    }
+    assert_untouched(LISTS[1], &["--via", "preload"], &[("GLURAY_ENABLED", "0")]);
+}
+
+#[test]
+fn quads_of_smooth_points_or_lines_are_split_as_the_driver_does() {
+    check_all(&[
+        "quads_with_smooth_lines",
+        "quads_with_smooth_lines_and_offset",
+        "quads_by_arrays_with_smooth_points_and_offset",
+        "quads_with_stippled_and_offset_lines",
+        "quads_with_unbroken_stippled_lines_and_offset",
+        "quads_of_two_sides_with_smooth_lines",
+        "quads_of_two_sides",
+    ]);
+}
+
+#[test]
+fn a_test_for_equal_depth_after_the_driver_is_the_drivers() {
+    let traced = Expected { traced: false, exit: 0 };
+    check("equal_depths_after_the_driver", &traced, &["--trace", "all"]);
 }
 
 #[test]

@@ -53,7 +53,7 @@ impl Capture {
     /// How the driver would split the batch's quads into triangles.
     fn split_of_batch(&mut self, s: &Snapshot) -> QuadSplit {
         // Lists end batches with quads before and after them.
-        let all_turned = s.flat || self.depth_of_lists > 0;
+        let all_turned = s.turns_quads() || self.depth_of_lists > 0;
         let mut split =
             QuadSplit { first_provokes: s.first_vertex_provokes, all_turned, turned: Vec::new() };
         if std::mem::take(&mut self.recorder.quads) && !all_turned {

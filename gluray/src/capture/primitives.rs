@@ -21,8 +21,11 @@ pub(crate) fn is_filled(mode: u32) -> bool {
 ///
 /// OpenGL does not specify the diagonal along which a quad is split, and Mesa uses either. It
 /// splits from the second vertex to the fourth when the quads are flat, indexed, or in a display
-/// list, and when it must clip any vertex of the up to 4096 that it draws at once. Otherwise it
-/// splits from the first to the third. Colours and non-planar quads show the difference.
+/// list, when lines are smoothed and polygons offset ([`Snapshot::turns_quads`]), and when it must
+/// clip any vertex of the up to 4096 that it draws at once. Otherwise it splits from the first to
+/// the third. Colours and non-planar quads show the difference.
+///
+/// [`Snapshot::turns_quads`]: crate::state::snapshot::Snapshot::turns_quads
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
 pub(crate) struct QuadSplit {
     /// The convention for the vertex of the flat colour.

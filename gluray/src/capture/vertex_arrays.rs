@@ -237,7 +237,7 @@ impl VertexSelection {
         bytes: &[u8],
     ) -> QuadSplit {
         let mut split = self.plain_split(s.first_vertex_provokes);
-        split.all_turned |= s.flat;
+        split.all_turned |= s.turns_quads();
         let (_, count) = self.span();
         if mode == QUADS && !split.all_turned {
             let clipped = s.clips();

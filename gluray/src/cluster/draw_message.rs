@@ -51,6 +51,8 @@ wire_struct!(Snapshot {
     clip_planes,
     polygon_offset,
     offset_by_length,
+    smooth_or_stippled,
+    any_offset,
     depth_test,
     depth_func,
     depth_mask,

@@ -70,6 +70,10 @@ pub(crate) struct Snapshot {
     /// The slope that the factor multiplies is the length of the gradient, as in VTK's shaders.
     /// Otherwise it is the greater component, as in OpenGL.
     pub(crate) offset_by_length: bool,
+    /// Points or lines are smoothed, or lines stippled.
+    pub(crate) smooth_or_stippled: bool,
+    /// Polygons of any mode are offset.
+    pub(crate) any_offset: bool,
     pub(crate) depth_test: bool,
     pub(crate) depth_func: u32,
     pub(crate) depth_mask: bool,
@@ -260,6 +264,12 @@ impl Snapshot {
         if capabilities.core {
             return;
         }
+        // A pattern without gaps is no stippling to Gallium.
+        self.smooth_or_stippled = [POINT_SMOOTH, LINE_SMOOTH].into_iter().any(gl::is_enabled)
+            || gl::is_enabled(LINE_STIPPLE) && gl::int(LINE_STIPPLE_PATTERN) & 0xffff != 0xffff;
+        self.any_offset = [POLYGON_OFFSET_FILL, POLYGON_OFFSET_LINE, POLYGON_OFFSET_POINT]
+            .into_iter()
+            .any(gl::is_enabled);
         self.alpha_test = gl::is_enabled(ALPHA_TEST);
         self.alpha_test_passes_one = self.alpha_test && {
             let reference = gl::floats::<1>(ALPHA_TEST_REF)[0];
@@ -300,6 +310,15 @@ impl Snapshot {
             end: gl::floats::<1>(FOG_END)[0],
             color: gl::floats(FOG_COLOR),
         });
+    }
+
+    /// True when the driver splits all quads from the second vertex to the fourth: with flat
+    /// colours, and where llvmpipe hands primitives to Gallium's draw module. It does so as soon as
+    /// points or lines would be smoothed or lines stippled, whatever is drawn, and the draw module
+    /// takes polygons apart when it must offset them or choose a side's colour.
+    pub(crate) fn turns_quads(&self) -> bool {
+        let by_draw_module = self.any_offset || self.lighting && self.two_side;
+        self.flat || self.smooth_or_stippled && by_draw_module
     }
 
     /// Returns whether points in object space are outside of the view volume, so that the driver
