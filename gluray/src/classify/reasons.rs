@@ -1,10 +1,29 @@
 //! Why draws are left to the driver, in more words, and what can be done about it.
 
-/// What a reason in a report means, and the cure, if there is one. `None` for a reason that speaks
-/// for itself.
+/// What a reason in a report means, and the cure, if there is one, without those that the run had
+/// already: its mode, and `--trace all`. `None` for a reason that speaks for itself.
+pub fn advice_for(reason: &str, mode: &str, traces_all: bool) -> Option<String> {
+    let had = |part: &&str| {
+        part.contains(&format!("--mode {mode}")) || traces_all && part.contains("--trace all")
+    };
+    let text = advice(reason)?;
+    let parts: Vec<&str> = text.split("; ").filter(|part| !had(part)).collect();
+    match parts.is_empty() {
+        true => Some(format!("mode {mode} cannot trace it either")),
+        false => Some(parts.join("; ")),
+    }
+}
+
+/// What a reason in a report means, and the cure, if there is one. Cures stand behind semicolons.
+/// `None` for a reason that speaks for itself.
 pub fn advice(reason: &str) -> Option<&'static str> {
     TABLE.iter().find(|(start, _)| reason.starts_with(start)).map(|(_, text)| *text)
 }
+
+/// Mode `enhance` does not read shaders, but not every shader is one for it.
+const NOT_RECOGNISED: &str = "not of a family that is recognised; --mode enhance needs no \
+                              understanding, only OpenGL 3 and a vertex shader that multiplies \
+                              positions by a matrix";
 
 /// By the beginning of the reason.
 const TABLE: &[(&str, &str)] = &[
@@ -43,10 +62,7 @@ const TABLE: &[(&str, &str)] = &[
         "the program finds out what is under the mouse; nothing is seen of that",
     ),
     ("tracing is off", "mode off, or `enabled = false`: switch it on with --mode or on the panel"),
-    (
-        "an assembly program",
-        "ARB programs are not understood; --mode enhance needs no understanding",
-    ),
+    ("an assembly program", "ARB programs are not understood, and no mode traces them"),
     (
         "several colour buffers",
         "as in dual depth peeling or deferred shading; try the program's settings for translucency",
@@ -95,6 +111,10 @@ const TABLE: &[(&str, &str)] = &[
         "such draws are mostly text, legends and menus; --trace all traces them, too",
     ),
     (
+        "a test for equal depth",
+        "depths of rays agree with the driver's to some steps only, so who drew first draws again",
+    ),
+    (
         "blending",
         "translucent in a way that is not followed; --trace all traces it in the order drawn",
     ),
@@ -117,18 +137,28 @@ const TABLE: &[(&str, &str)] = &[
         "front and back faces are masked differently, and fragments of ours have no sides",
     ),
     ("stencil", "drawn through a mask, as constructive solid geometry in image space is"),
-    ("a shader", "not of a family that is recognised; --mode enhance needs no understanding"),
-    (
-        "a program",
-        "not of a family that is recognised; --mode enhance needs no understanding, only OpenGL 3 \
-         and a program linked in that mode",
-    ),
+    ("a shader", NOT_RECOGNISED),
+    ("a program", NOT_RECOGNISED),
     ("a forked process", "a child made by fork has none of our threads"),
 ];
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_a_run_had_already_is_not_advised() {
+        for (reason, mode) in [("a shader of its own", "enhance"), ("a shadow map", "rich")] {
+            let other = advice_for(reason, "match", false).expect("known");
+            assert!(other.contains(&format!("--mode {mode}")), "{other}");
+            let same = advice_for(reason, mode, false).expect("known");
+            assert!(!same.contains("--mode") && !same.is_empty(), "{same}");
+        }
+        let all = |on| advice_for("blending", "match", on).expect("known");
+        assert!(all(false).contains("--trace all") && !all(true).contains("--trace all"));
+        assert!(!advice("an assembly program").expect("known").contains("--mode"));
+        assert_eq!(advice_for("an empty viewport", "match", true), None);
+    }
 
     #[test]
     fn what_is_known_is_explained_and_what_is_not_is_left_alone() {

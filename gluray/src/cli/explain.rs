@@ -1,7 +1,7 @@
 //! `gluray explain`: an account of a run, in words.
 
 use super::last_report;
-use crate::classify::reasons::advice;
+use crate::classify::reasons::advice_for;
 use crate::host::report::Report;
 use anyhow::Context as _;
 use datasets::cli::{CommonArgs, CureExt as _, Status};
@@ -96,11 +96,14 @@ fn in_words(r: &Report) -> String {
     line(format!("\npassed  {:>12} draws{}", r.passed_draws, per_frame(r.passed_draws)));
     for (why, n) in by_size(&r.passed_reasons) {
         line(format!("        {n:>12} {why}"));
-        if let Some(text) = advice(why) {
+        if let Some(text) = advice_for(why, &r.mode, r.trace_all) {
             line(format!("                     → {text}"));
         }
     }
-    if r.traced_draws + r.passed_draws == 0 {
+    if r.traced_draws + r.passed_draws == 0 && r.mode == "off" {
+        line("        tracing was off: calls went to the driver as they came, uncounted".into());
+        line("                     → switch it on with --mode or on the panel".into());
+    } else if r.traced_draws + r.passed_draws == 0 {
         line(
             "        nothing was drawn: the library did not reach the program, or the program uses \
              no OpenGL"
@@ -128,6 +131,7 @@ fn in_words(r: &Report) -> String {
             };
             line(format!("        {ms:>12.1} ms {phase}{each}"));
         }
+        slowness(r).into_iter().for_each(|text| line(format!("                     → {text}")));
     }
     if !r.objects.is_empty() {
         line("\nobjects, by the keys that [objects.KEY] takes".into());
@@ -142,6 +146,30 @@ fn in_words(r: &Report) -> String {
     r.faults.iter().for_each(|f| line(format!("\nFAULT (the driver drew from here on): {f}")));
     s.truncate(s.trim_end().len());
     s
+}
+
+/// Why frames are slow, in milliseconds a frame from which a program no longer feels direct.
+fn slowness(r: &Report) -> Option<String> {
+    const SLOW: f64 = 100.0;
+    let frames = r.frames.max(1) as f64;
+    let of = |phase: &str| r.milliseconds.get(phase).copied().unwrap_or(0.0) / frames;
+    if of("trace") < SLOW {
+        return None;
+    }
+    let all: u64 = r.rays.values().sum();
+    let (kind, most) = by_size(&r.rays).into_iter().next()?;
+    let cure = match kind {
+        "shadow" => "--set effects.shadows=false sends none of them",
+        "ambient occlusion" => "--set effects.ambient_occlusion_samples=N sends fewer",
+        "path" => "--set samples=N sends fewer",
+        _ if r.mode == "match" => "a smaller window has fewer pixels",
+        _ => "--mode match sends only what the driver's picture needs",
+    };
+    Some(format!(
+        "tracing takes {:.0} ms a frame, and {:.0} % of its rays are {kind}: {cure}",
+        of("trace"),
+        100.0 * most as f64 / all.max(1) as f64
+    ))
 }
 
 fn or_none(text: &str) -> &str {
