@@ -2,12 +2,15 @@
 //!
 //! Only requested effects that can change a pixel are computed. No shadow rays go from points that
 //! the eye sees to a point light at the eye, or where a surface faces away. No occlusion rays are
-//! traced when none are set. Rays are generated in eye space, which all draws of a frame share, and
-//! traverse each draw's own BVH.
+//! traced when none are set. Rays are generated in eye space, which all draws of a frame share. A
+//! tree of boxes has the draws that a ray may hit, and these are traversed in their own spaces.
+
+mod draw_tree;
 
 use crate::capture::draw::{Draw, Shading};
 use crate::host::config::{Mode, Settings};
 use crate::trace::Prepared;
+use draw_tree::DrawTree;
 use rt_core::camera::Camera;
 use rt_core::glam::{DMat4, DVec3, Vec3};
 use rt_core::math::SplitMix64;
@@ -91,6 +94,8 @@ pub(crate) struct RayScene<'a> {
     pub(crate) object_from_eye: Vec<Option<DMat4>>,
     /// The draws that let light through. They cast no shadow.
     pub(crate) clear: Vec<bool>,
+    /// Boxes around the draws.
+    tree: DrawTree,
     pub(crate) diagonal: f64,
     pub(crate) settings: &'a Settings,
     /// A different number for each sample of a pixel, so that each sample adds its own rays to the
@@ -121,8 +126,8 @@ impl<'a> RayScene<'a> {
 
     /// The scene of the draws, whatever the mode asks for.
     pub(crate) fn of(draws: &'a [Prepared<'a>], settings: &'a Settings) -> RayScene<'a> {
-        let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        for p in draws {
+        let around = |p: &Prepared<'_>| {
+            let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
             let (m, b) = (eye_from_object(p.draw), p.draw.geometry.bounds());
             for corner in 0..8 {
                 let pick = |bit: i32, k: usize| {
@@ -131,7 +136,15 @@ impl<'a> RayScene<'a> {
                 let c = m.transform_point3(DVec3::new(pick(1, 0), pick(2, 1), pick(4, 2)));
                 (lo, hi) = (lo.min(c), hi.max(c));
             }
-        }
+            [lo, hi]
+        };
+        let boxes: Vec<[DVec3; 2]> = draws.iter().map(around).collect();
+        let nothing = [DVec3::INFINITY, DVec3::NEG_INFINITY];
+        let [lo, hi] = boxes.iter().fold(nothing, |[a, b], [c, d]| [a.min(*c), b.max(*d)]);
+        // A box is a little larger than its draw, by more than what a ray that is rounded in the
+        // draw's own space can miss it by.
+        let more = DVec3::splat(1e-5 * (hi - lo).length());
+        let boxes: Vec<_> = boxes.into_iter().map(|[a, b]| [a - more, b + more]).collect();
         let invert = |p: &Prepared<'_>| {
             let m = eye_from_object(p.draw);
             (m.determinant() != 0.0).then(|| m.inverse())
@@ -143,6 +156,7 @@ impl<'a> RayScene<'a> {
             sample,
             object_from_eye: draws.iter().map(invert).collect(),
             clear: vec![false; draws.len()],
+            tree: DrawTree::new(&boxes),
             draws,
             diagonal: (hi - lo).length(),
             settings,
@@ -153,8 +167,9 @@ impl<'a> RayScene<'a> {
 
     /// True when anything lies between `from` and `from + dir * most` (in eye space).
     fn hidden(&self, from: DVec3, dir: DVec3, most: f64) -> bool {
-        self.draws.iter().zip(&self.object_from_eye).zip(&self.clear).any(|((p, m), clear)| {
-            let Some(m) = m.filter(|_| !clear) else { return false };
+        self.tree.any(from, dir, most, |i| {
+            let Some(m) = self.object_from_eye[i].filter(|_| !self.clear[i]) else { return false };
+            let p = &self.draws[i];
             let (origin, dir) = (m.transform_point3(from), m.transform_vector3(dir));
             let (ray, moved) = p.world.ray_from_world(origin, dir);
             let t_max = (most - moved) as f32;
