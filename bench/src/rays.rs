@@ -269,6 +269,7 @@ fn unit(seed: u32) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rt_core::mesh::TriMesh;
 
     fn square() -> TriMesh {
         let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
