@@ -348,6 +348,6 @@ mod tests {
 
     #[test]
     fn rays_are_the_same_every_time() {
-        assert_eq!(incoherent(&square(), 100), incoherent(&square(), 100));
+        assert_eq!(incoherent(square().bounds(), 100), incoherent(square().bounds(), 100));
     }
 }
