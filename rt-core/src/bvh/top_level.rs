@@ -1,10 +1,10 @@
 //! The upper level of a world: where the instances are in render space, and a tree over them.
 
-use super::blas::{Blas, IdWriter};
-use super::build::{PrimRef, Progress, build_wide};
+use super::blas::Blas;
+use super::build::{LeafCapacity, PrimRef, Progress, build_wide};
 use super::error::BuildError;
 use super::geometry::Instance;
-use super::layout::wide::WideBvh;
+use super::layout::wide::{LeafWriter, Unit, WideBvh, write_id_leaf};
 use super::mesh_group::{GroupChoice, MeshGroup};
 use super::options::BuildQuality;
 use super::placement::Placement;
@@ -26,6 +26,19 @@ pub(super) struct TopLevel {
 /// Blocks of rays in any direction try at most this many entries one after the other. Ray by ray
 /// through the upper level, they would share no work.
 const MOST_IN_TURN: usize = 4;
+
+/// Leaves of one instance each. An instance is entered only if a ray meets its own box: with four
+/// in a leaf, a ray was moved into the space of all four where it met the box around them.
+struct InstanceWriter;
+
+impl LeafWriter for InstanceWriter {
+    const UNITS: usize = 1;
+    const CAPACITY: usize = 1;
+
+    fn write(&self, prims: &[u32], out: &mut [Unit]) {
+        write_id_leaf(out, prims.iter().copied());
+    }
+}
 
 /// Places the instances in render space, whose zero is at `origin` in the world.
 pub(super) fn build_top_level(
@@ -69,7 +82,9 @@ pub(super) fn build_top_level(
     } else {
         Vec::new()
     };
-    let tlas = build_wide(refs, &IdWriter, BuildQuality::Balanced.config(), notes, progress)?;
+    let mut config = BuildQuality::Balanced.config();
+    config.sah.leaves = LeafCapacity::One;
+    let tlas = build_wide(refs, &InstanceWriter, config, notes, progress)?;
     Ok(TopLevel { placements, tlas, only, few })
 }
 
