@@ -20,6 +20,7 @@ mod placement;
 mod query;
 mod ray_query;
 mod refit;
+mod several_entries;
 mod streams;
 mod top_level;
 pub(crate) mod traverse;

@@ -1,9 +1,7 @@
 //! Traces many rays in one call: in packets for coherent rays, and with a shared start of the
 //! traversal for incoherent ones.
 
-use super::blas::leaf_primitive_ids;
 use super::entry::Entry;
-use super::entry_blocks::EntryBlocks;
 use super::instance_filter::InstanceFilter;
 use super::layout::wide::ChildRef;
 use super::options::Robustness;
@@ -11,32 +9,25 @@ use super::placement::ORDINARY_LENGTHS;
 use super::placement::Placement;
 use super::query::{AnyHit, ClosestHit, FastTest, HitQuery, TriangleTest, WatertightTest};
 use super::world::{World, with_ordinary_length};
-use crate::bvh::traverse::block_entries::traverse_block;
 use crate::bvh::traverse::incoherent;
 use crate::bvh::traverse::packet::{GROUPS, Packet, PacketLimits};
-use crate::bvh::traverse::single::inflate_t;
 use crate::bvh::traverse::tree_view::TreeView;
 use crate::ray::{Hit, HitBlock, LANES, NO_HIT, Ray, RayBlock};
 use crate::stats::{Counter, count};
 use fearless_simd::{Simd, SimdBase, SimdMask, dispatch, f32x16, mask32x16};
 use std::cell::RefCell;
 
-/// When a packet may hit more instances than this, its rays are traced one by one: most of them hit
-/// only a few each. Measured on glyphs, 512² primary rays, packets against one by one: 41 and 47 ms
-/// with 216 instances, 88 and 60 with 1,000, 4104 and 112 with 125,000.
-const MOST_CANDIDATES: usize = 16;
-
 /// Per-thread buffers: a packet is 24 KiB, too large to clear for every call.
-struct TraversalScratch {
+pub(super) struct TraversalScratch {
     /// Packets against instances' boxes and against triangles.
-    outer: Box<Packet>,
+    pub(super) outer: Box<Packet>,
     inner: Box<Packet>,
     /// A packet's rays in an instance's local space, and how far their origins were moved.
     local: Vec<RayBlock>,
     moved: Vec<[f64; LANES]>,
     local_hits: Vec<HitBlock>,
-    candidates: Vec<(f32, ChildRef)>,
-    order: Vec<(f32, u32)>,
+    pub(super) candidates: Vec<(f32, ChildRef)>,
+    pub(super) order: Vec<(f32, u32)>,
 }
 
 thread_local! {
@@ -287,15 +278,8 @@ impl World {
         scratch: &mut TraversalScratch,
     ) {
         let Some(only) = self.only_entry() else {
-            if self.few.is_empty() {
-                // As blocks through the upper level, 20,000 instances took 1.1 (rays of one origin)
-                // to 2.8 times as long: the rays part before they reach an instance.
-                self.trace_single_rays::<S, T, Q>(simd, rays, hits, filter);
-            }
-            for &id in self.few.iter().filter(|&&id| self.allows(filter, id)) {
-                let (entry, coherence) = (self.entry(id), Coherence::Incoherent);
-                self.trace_entry::<S, T, Q>(simd, entry, rays, hits, filter, scratch, coherence);
-            }
+            let coherence = Coherence::Incoherent;
+            self.trace_several::<S, T, Q>(simd, rays, hits, filter, scratch, coherence);
             return;
         };
         match only.triangles(filter) {
@@ -328,54 +312,11 @@ impl World {
             self.trace_entry::<S, T, Q>(simd, only, rays, hits, filter, scratch, coherence);
             return;
         }
-        // ---- Several entries: those whose boxes the packet intersects, nearest first.
-        scratch.candidates.clear();
-        if self.only.is_none() && scratch.outer.load(simd, rays, &PacketLimits::NONE) {
-            scratch.outer.collect(simd, &TreeView::all(&self.tlas), &mut scratch.candidates);
-            let mut order = std::mem::take(&mut scratch.order);
-            order.clear();
-            for &(distance, leaf) in &scratch.candidates {
-                let met = leaf_primitive_ids(&self.tlas.units, leaf).iter();
-                let met = met.filter(|&&id| self.allows(filter, id));
-                order.extend(met.map(|&i| (distance, i)));
-            }
-            let use_packets = order.len() <= MOST_CANDIDATES;
-            if use_packets {
-                order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-                for &(distance, id) in &order {
-                    if all_resolved::<Q>(rays, hits, distance) {
-                        break;
-                    }
-                    let (entry, coherence) = (self.entry(id), Coherence::Coherent);
-                    self.trace_entry::<S, T, Q>(
-                        simd, entry, rays, hits, filter, scratch, coherence,
-                    );
-                }
-            }
-            scratch.order = order;
-            if use_packets {
-                return;
-            }
-        }
-        self.trace_blocks::<S, T, Q>(simd, rays, hits, filter);
+        let coherence = Coherence::Coherent;
+        self.trace_several::<S, T, Q>(simd, rays, hits, filter, scratch, coherence);
     }
 
-    /// Blocks of similar rays that meet many entries, sixteen rays together.
-    fn trace_blocks<S: Simd, T: TriangleTest, Q: HitQuery>(
-        &self,
-        simd: S,
-        rays: &[RayBlock],
-        hits: &mut [HitBlock],
-        filter: InstanceFilter<'_>,
-    ) {
-        for (rays, hits) in rays.iter().zip(hits) {
-            let active = rays.active_lanes();
-            let mut entries = EntryBlocks::<T, Q>::new(self, rays, hits, filter);
-            traverse_block(simd, &self.tlas, rays, active, &mut entries);
-        }
-    }
-
-    fn trace_single_rays<S: Simd, T: TriangleTest, Q: HitQuery>(
+    pub(super) fn trace_single_rays<S: Simd, T: TriangleTest, Q: HitQuery>(
         &self,
         simd: S,
         rays: &[RayBlock],
@@ -404,7 +345,7 @@ impl World {
 
     /// One entry against blocks whose closest hits so far are in `hits`; merges the nearer ones.
     #[allow(clippy::too_many_arguments, reason = "the state of one call of the loop above")]
-    fn trace_entry<S: Simd, T: TriangleTest, Q: HitQuery>(
+    pub(super) fn trace_entry<S: Simd, T: TriangleTest, Q: HitQuery>(
         &self,
         simd: S,
         entry: Entry<'_>,
@@ -442,17 +383,6 @@ impl World {
             }
         }
     }
-}
-
-/// Whether nothing at `distance` or farther can change an answer.
-fn all_resolved<Q: HitQuery>(rays: &[RayBlock], hits: &[HitBlock], distance: f32) -> bool {
-    rays.iter().zip(hits).all(|(r, h)| {
-        (0..LANES).all(|lane| {
-            let found = h.prim[lane] != NO_HIT;
-            let idle = r.t_max[lane] <= r.t_min[lane];
-            idle || found && (Q::ANY || inflate_t(h.t[lane]) < distance)
-        })
-    })
 }
 
 /// Whether an active ray's direction is so short or long that the single-ray code rescales it. A

@@ -14,6 +14,8 @@ struct Trial {
     best_time: f32,
     /// Pieces until the next trial.
     wait: u32,
+    /// Number of trials so far.
+    count: u32,
 }
 
 /// Where the comparison with another way stands. A trial is compared with the mean of the pieces
@@ -41,6 +43,9 @@ pub(crate) struct TimedChoice<const N: usize> {
 impl<const N: usize> TimedChoice<N> {
     /// Shortest and longest time between two trials of a way, in pieces.
     const WAIT: [f32; 2] = [10.0, 1024.0];
+    /// Longest time after the first trial; it doubles with each. A first trial may be interrupted,
+    /// or meet code and data that are not in the caches yet.
+    const FIRST_WAIT: f32 = 32.0;
     /// Part of the old sums that a new trial keeps.
     const MEMORY: f32 = 0.7;
     /// A way replaces the best one when it takes less than this part of its time.
@@ -51,7 +56,7 @@ impl<const N: usize> TimedChoice<N> {
 
     /// `best` is taken for the best way at first.
     pub(crate) const fn new(best: usize) -> Self {
-        let trial = Trial { time: 0.0, best_time: 0.0, wait: 2 };
+        let trial = Trial { time: 0.0, best_time: 0.0, wait: 2, count: 0 };
         TimedChoice { best, trials: [trial; N], step: Step::Idle }
     }
 
@@ -100,11 +105,13 @@ impl<const N: usize> TimedChoice<N> {
         let ratio = trial.time / trial.best_time.max(f32::MIN_POSITIVE);
         let [shortest, longest] = Self::WAIT;
         // A trial costs ratio − 1 pieces. So trials cost at most two percent of the time.
+        let longest = longest.min(Self::FIRST_WAIT * f32::exp2(trial.count as f32));
         trial.wait = (shortest * ratio.powi(3)).clamp(shortest, longest) as u32;
+        trial.count = (trial.count + 1).min(16);
         if ratio < Self::BETTER {
-            let Trial { time, best_time, .. } = *trial;
+            let Trial { time, best_time, count, .. } = *trial;
             let wait = shortest as u32;
-            self.trials[self.best] = Trial { time: best_time, best_time: time, wait };
+            self.trials[self.best] = Trial { time: best_time, best_time: time, wait, count };
             for (j, other) in self.trials.iter_mut().enumerate() {
                 if j != self.best && j != k {
                     other.best_time *= ratio;
