@@ -72,10 +72,12 @@ const FULL: &[(&str, &[Isa])] = &[
     ("cells", &[Isa::Best]),
     ("terrain", &[Isa::Best]),
     ("city", &[Isa::Best, Isa::Avx2]),
+    ("forest", &[Isa::Best]),
     ("slivers", &[Isa::Best]),
 ];
 const QUICK: &[(&str, &[Isa])] =
-    &[("wavelet 1M", &[Isa::Best]), ("pipes", &[Isa::Best]), ("city", &[Isa::Best])];
+    &[("wavelet 1M", BEST), ("pipes", BEST), ("city", BEST), ("forest", BEST)];
+const BEST: &[Isa] = &[Isa::Best];
 
 /// Makes a scene of [`FULL`], smaller for quick runs.
 fn scene(context: &mut Context<'_>, name: &str) -> anyhow::Result<MeshScene> {
@@ -89,6 +91,7 @@ fn scene(context: &mut Context<'_>, name: &str) -> anyhow::Result<MeshScene> {
         "terrain" => meshes::terrain(size(4_000_000, 200_000)),
         "slivers" => meshes::slivers(size(500_000, 50_000)),
         "city" => return Ok(meshes::city(size(3000, 300))),
+        "forest" => return Ok(meshes::forest(size(20_000, 1000))),
         _ => anyhow::bail!("there is no scene `{name}`"),
     };
     Ok(MeshScene::one(name, mesh))
@@ -107,6 +110,8 @@ fn measure(
     let tracers = TracerSet::build(scene, installed, isa, &mut |s| {
         context.report_step(format!("{full_name}: {s}"))
     })?;
+    let left_out = |fault: &String| format!("{full_name}: {fault}");
+    record.missing.extend(tracers.faults().iter().map(left_out));
     let base = Row::new()
         .with("mesh", name)
         .with("triangles", triangles)

@@ -38,7 +38,7 @@ impl Kind {
     }
 
     /// Whether the rays only test for occlusion.
-    fn occlusion(self) -> bool {
+    pub(super) fn occlusion(self) -> bool {
         matches!(self, Kind::Shadow | Kind::ShadowFromLight | Kind::AmbientOcclusion)
     }
 

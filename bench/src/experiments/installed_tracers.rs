@@ -132,8 +132,11 @@ impl TracerSet {
         for (name, scene) in &self.embree {
             let hint = if kind.coherent() { "coherent" } else { "incoherent" };
             let widths = self.isa.embree_widths();
-            let widths = if all_modes { widths } else { &widths[..1] };
-            list.extend(widths.iter().map(|&width| Contender {
+            let sound =
+                |width: usize| !(kind.occlusion() && scene.occlusion_fault(width).is_some());
+            let widths = widths.iter().copied().filter(|&width| sound(width));
+            let widths = widths.take(if all_modes { usize::MAX } else { 1 });
+            list.extend(widths.map(|width| Contender {
                 tracer_name: name.clone(),
                 mode: format!("packets of {width}, {hint}"),
                 tracer: Box::new(scene.view(width, kind.coherent())),
@@ -151,6 +154,15 @@ impl TracerSet {
             list.push(Contender { tracer_name, mode, tracer: Box::new(obvhs) });
         }
         list
+    }
+
+    /// What is left out because a baseline does not do it.
+    pub(super) fn faults(&self) -> Vec<String> {
+        let widths = self.isa.embree_widths();
+        let of_scene = |scene: &EmbreeScene| {
+            widths.iter().filter_map(|&width| scene.occlusion_fault(width)).collect::<Vec<_>>()
+        };
+        self.embree.iter().flat_map(|(_, scene)| of_scene(scene)).collect()
     }
 
     /// Cost of each build.
