@@ -5,6 +5,7 @@ use super::entry::Entry;
 use super::instance_filter::InstanceFilter;
 use super::layout::wide::{ChildRef, Unit};
 use super::query::{HitQuery, TriangleTest};
+use super::streams::{limits_of, merge_hits};
 use super::world::World;
 use crate::bvh::traverse::block_entries::BlockEntries;
 use crate::bvh::traverse::incoherent;
@@ -38,6 +39,7 @@ impl<'a, T, Q> EntryBlocks<'a, T, Q> {
 impl<S: Simd, T: TriangleTest, Q: HitQuery> BlockEntries<S> for EntryBlocks<'_, T, Q> {
     type Query = Q;
 
+    #[inline(always)]
     fn leaf(
         &mut self,
         simd: S,
@@ -57,6 +59,7 @@ impl<S: Simd, T: TriangleTest, Q: HitQuery> BlockEntries<S> for EntryBlocks<'_, 
 
 impl<T: TriangleTest, Q: HitQuery> EntryBlocks<'_, T, Q> {
     /// The rays of `lanes` through one entry.
+    #[inline(always)]
     fn enter<S: Simd>(
         &mut self,
         simd: S,
@@ -65,19 +68,12 @@ impl<T: TriangleTest, Q: HitQuery> EntryBlocks<'_, T, Q> {
         t: &mut [f32; LANES],
         active: &mut u16,
     ) {
-        let (mut local, mut moved, mut inside) = (RayBlock::INACTIVE, [0.0; LANES], 0u16);
-        for lane in lanes_of(lanes) {
-            let mut ray = self.rays.get(lane);
-            if !Q::ANY && self.hits.prim[lane] != NO_HIT {
-                // One ulp past the best: a tie may go to this entry.
-                ray.t_max = self.hits.t[lane].next_up().min(ray.t_max);
-            }
-            let (ray, by) = entry.placement().enter(&ray);
-            if ray.t_max > ray.t_min {
-                local.set(lane, &ray);
-                moved[lane] = by;
-                inside |= 1 << lane;
-            }
+        let (mut local, mut moved) = (RayBlock::INACTIVE, [0.0; LANES]);
+        let limits = limits_of::<Q>(self.rays, self.hits);
+        let inside =
+            entry.placement().enter_block(self.rays, lanes, &limits, &mut local, &mut moved);
+        if inside == 0 {
+            return;
         }
         let mut found = HitBlock::MISS;
         match entry.triangles(self.filter) {
@@ -101,30 +97,19 @@ impl<T: TriangleTest, Q: HitQuery> EntryBlocks<'_, T, Q> {
                 }
             }
         }
-        for lane in lanes_of(inside) {
-            if found.prim[lane] == NO_HIT {
-                continue;
-            }
-            if Q::ANY {
-                self.hits.prim[lane] = 0;
-                *active &= !(1 << lane);
-                continue;
-            }
-            let Some(mut hit) = found.get(lane) else { continue };
-            if moved[lane] != 0.0 {
-                hit.t = (hit.t as f64 + moved[lane]) as f32;
-            }
-            let h = &mut *self.hits;
-            let tie = hit.t == h.t[lane] && hit.instance < h.instance[lane];
-            if hit.t < h.t[lane] || tie {
-                h.set(lane, Some(hit));
-                t[lane] = hit.t;
+        let nearer = merge_hits::<Q>(self.hits, &found, &moved, inside);
+        if Q::ANY {
+            *active &= !nearer;
+        } else {
+            for lane in 0..LANES {
+                t[lane] = if nearer >> lane & 1 == 1 { self.hits.t[lane] } else { t[lane] };
             }
         }
     }
 }
 
 /// The numbers of the lanes in a mask.
+#[inline(always)]
 fn lanes_of(mut mask: u16) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
         (mask != 0).then(|| {

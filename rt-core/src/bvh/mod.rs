@@ -8,6 +8,7 @@ mod build;
 mod closest_point;
 mod entry;
 mod entry_blocks;
+mod entry_packets;
 mod error;
 mod geometry;
 mod instance_filter;

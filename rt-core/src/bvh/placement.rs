@@ -3,7 +3,7 @@
 use super::layout::local_frame::LocalFrame;
 use crate::bvh::traverse::packet::PacketLimits;
 use crate::math::{Aabb, max_abs};
-use crate::ray::{Ray, RayBlock};
+use crate::ray::{LANES, Ray, RayBlock};
 use fearless_simd::{Simd, SimdBase, SimdMask, f32x16};
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 
@@ -165,6 +165,65 @@ impl Placement {
         };
         let local = Ray { origin: (o + d * moved).as_vec3(), dir: d.as_vec3(), t_min, t_max };
         (local, moved)
+    }
+
+    /// [`Placement::enter`] for the rays in `lanes` of a block, each up to its `t_max`: the same
+    /// bits. Writes the rays to `local`, where other lanes become inactive, and how far they were
+    /// moved to `moved`. Returns the lanes that can hit something.
+    #[inline(always)]
+    pub(crate) fn enter_block(
+        &self,
+        rays: &RayBlock,
+        lanes: u16,
+        t_max: &[f32; LANES],
+        local: &mut RayBlock,
+        moved: &mut [f64; LANES],
+    ) -> u16 {
+        let mut far = [false; LANES];
+        if self.identity {
+            *local = *rays;
+            for lane in 0..LANES {
+                let origin = Vec3::new(rays.ox[lane], rays.oy[lane], rays.oz[lane]);
+                far[lane] = max_abs(origin - self.center_f32) > self.near_f32;
+            }
+        } else {
+            // Row by row, in the order of operations of `DAffine3`.
+            let DAffine3 { matrix3: m, translation: t } = self.local_from_render;
+            let (c, reach) = (self.center, FAR_RADII * self.radius);
+            for lane in 0..LANES {
+                let o = [rays.ox[lane], rays.oy[lane], rays.oz[lane]].map(f64::from);
+                let d = [rays.dx[lane], rays.dy[lane], rays.dz[lane]].map(f64::from);
+                let x = m.x_axis.x * o[0] + m.y_axis.x * o[1] + m.z_axis.x * o[2] + t.x;
+                let y = m.x_axis.y * o[0] + m.y_axis.y * o[1] + m.z_axis.y * o[2] + t.y;
+                let z = m.x_axis.z * o[0] + m.y_axis.z * o[1] + m.z_axis.z * o[2] + t.z;
+                let away = (x - c.x).abs().max((y - c.y).abs()).max((z - c.z).abs());
+                far[lane] = away > reach;
+                (local.ox[lane], local.oy[lane], local.oz[lane]) = (x as f32, y as f32, z as f32);
+                local.dx[lane] = (m.x_axis.x * d[0] + m.y_axis.x * d[1] + m.z_axis.x * d[2]) as f32;
+                local.dy[lane] = (m.x_axis.y * d[0] + m.y_axis.y * d[1] + m.z_axis.y * d[2]) as f32;
+                local.dz[lane] = (m.x_axis.z * d[0] + m.y_axis.z * d[1] + m.z_axis.z * d[2]) as f32;
+            }
+        }
+        let (mut inside, mut outside) = (0u16, 0u16);
+        for lane in 0..LANES {
+            let on = lanes >> lane & 1 == 1;
+            local.t_min[lane] = if on { rays.t_min[lane] } else { 0.0 };
+            local.t_max[lane] = if on { t_max[lane] } else { -1.0 };
+            moved[lane] = 0.0;
+            inside |= u16::from(local.t_max[lane] > local.t_min[lane]) << lane;
+            outside |= u16::from(on & far[lane]) << lane;
+        }
+        // Origins far away are rare: one by one.
+        while outside != 0 {
+            let lane = outside.trailing_zeros() as usize & 15;
+            outside &= outside - 1;
+            let (ray, by) = self.enter(&Ray { t_max: t_max[lane], ..rays.get(lane) });
+            local.set(lane, &ray);
+            moved[lane] = by;
+            inside &= !(1 << lane);
+            inside |= u16::from(ray.t_max > ray.t_min) << lane;
+        }
+        inside
     }
 }
 

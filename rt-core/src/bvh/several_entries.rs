@@ -1,24 +1,23 @@
 //! Many rays through a world of several instances.
 
-use super::blas::leaf_primitive_ids;
 use super::entry_blocks::EntryBlocks;
+use super::entry_packets::{EntryPackets, EntryRoom};
 use super::instance_filter::InstanceFilter;
 use super::query::{HitQuery, TriangleTest};
 use super::streams::{Coherence, TraversalScratch};
 use super::world::World;
 use crate::bvh::traverse::block_entries::traverse_block;
-use crate::bvh::traverse::packet::PacketLimits;
-use crate::bvh::traverse::single::inflate_t;
+use crate::bvh::traverse::packet::{GROUPS, PacketLimits};
 use crate::bvh::traverse::timed_choice::TimedChoice;
 use crate::bvh::traverse::tree_view::TreeView;
-use crate::ray::{HitBlock, LANES, NO_HIT, RayBlock};
+use crate::ray::{HitBlock, LANES, RayBlock};
 use fearless_simd::Simd;
 use std::cell::Cell;
 
 // The ways through the upper level.
 
-/// Instance by instance, each with all rays that may meet it: fast for a few large instances.
-const BY_INSTANCE: usize = 0;
+/// Entry by entry, each with the rays of a packet that meet it: fast where many of them do.
+const BY_ENTRY: usize = 0;
 /// Sixteen rays together through the upper level and the instances that some of them meet.
 const IN_BLOCKS: usize = 1;
 /// Ray by ray: fast where rays part before they reach an instance.
@@ -36,10 +35,6 @@ thread_local! {
     };
 }
 
-/// When a packet may hit more instances than this, it is traced in blocks: most of its rays hit
-/// only a few of them.
-const MOST_CANDIDATES: usize = 16;
-
 impl World {
     /// At most sixteen blocks through the upper level.
     pub(super) fn trace_several<S: Simd, T: TriangleTest, Q: HitQuery>(
@@ -54,7 +49,7 @@ impl World {
         let mut choices = CHOICES.get();
         let choice = &mut choices[coherence as usize][Q::ANY as usize];
         let coherent = coherence == Coherence::Coherent;
-        let (way, start) = choice.next(|way| way != BY_INSTANCE || coherent);
+        let (way, start) = choice.next(|way| way != BY_ENTRY || coherent);
         match way {
             // Ray by ray through the upper level, they would share no work.
             _ if !coherent && !self.few.is_empty() => {
@@ -66,7 +61,7 @@ impl World {
                 }
                 return;
             }
-            BY_INSTANCE => self.trace_by_instance::<S, T, Q>(simd, rays, hits, filter, scratch),
+            BY_ENTRY => self.trace_by_entry::<S, T, Q>(simd, rays, hits, filter, scratch),
             IN_BLOCKS => self.trace_blocks::<S, T, Q>(simd, rays, hits, filter),
             _ => self.trace_single_rays::<S, T, Q>(simd, rays, hits, filter),
         }
@@ -75,8 +70,8 @@ impl World {
         CHOICES.set(choices);
     }
 
-    /// Those entries whose boxes the packet intersects, nearest first.
-    fn trace_by_instance<S: Simd, T: TriangleTest, Q: HitQuery>(
+    /// Entry by entry, each with all rays of the packet that meet its box.
+    fn trace_by_entry<S: Simd, T: TriangleTest, Q: HitQuery>(
         &self,
         simd: S,
         rays: &[RayBlock],
@@ -84,35 +79,17 @@ impl World {
         filter: InstanceFilter<'_>,
         scratch: &mut TraversalScratch,
     ) {
-        scratch.candidates.clear();
-        if self.only.is_none() && scratch.outer.load(simd, rays, &PacketLimits::NONE) {
-            scratch.outer.collect(simd, &TreeView::all(&self.tlas), &mut scratch.candidates);
-            let mut order = std::mem::take(&mut scratch.order);
-            order.clear();
-            for &(distance, leaf) in &scratch.candidates {
-                let met = leaf_primitive_ids(&self.tlas.units, leaf).iter();
-                let met = met.filter(|&&id| self.allows(filter, id));
-                order.extend(met.map(|&i| (distance, i)));
-            }
-            let use_packets = order.len() <= MOST_CANDIDATES;
-            if use_packets {
-                order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-                for &(distance, id) in &order {
-                    if all_resolved::<Q>(rays, hits, distance) {
-                        break;
-                    }
-                    let (entry, coherence) = (self.entry(id), Coherence::Coherent);
-                    self.trace_entry::<S, T, Q>(
-                        simd, entry, rays, hits, filter, scratch, coherence,
-                    );
-                }
-            }
-            scratch.order = order;
-            if use_packets {
-                return;
-            }
+        let TraversalScratch { outer, inner, local, moved, local_hits } = scratch;
+        if outer.load(simd, rays, &PacketLimits::NONE) {
+            local.resize(GROUPS, RayBlock::INACTIVE);
+            moved.resize(GROUPS, [0.0; LANES]);
+            local_hits.resize(GROUPS, HitBlock::MISS);
+            let room = EntryRoom { packet: inner, local, moved, local_hits };
+            let mut entries = EntryPackets::<T, Q>::new(self, rays, hits, filter, room);
+            outer.visit_entries(simd, &TreeView::all(&self.tlas), &mut entries);
+        } else {
+            self.trace_blocks::<S, T, Q>(simd, rays, hits, filter);
         }
-        self.trace_blocks::<S, T, Q>(simd, rays, hits, filter);
     }
 
     /// Blocks of similar rays that meet many entries, sixteen rays together.
@@ -129,15 +106,4 @@ impl World {
             traverse_block(simd, &self.tlas, rays, active, &mut entries);
         }
     }
-}
-
-/// Whether nothing at `distance` or farther can change an answer.
-fn all_resolved<Q: HitQuery>(rays: &[RayBlock], hits: &[HitBlock], distance: f32) -> bool {
-    rays.iter().zip(hits).all(|(r, h)| {
-        (0..LANES).all(|lane| {
-            let found = h.prim[lane] != NO_HIT;
-            let idle = r.t_max[lane] <= r.t_min[lane];
-            idle || found && (Q::ANY || inflate_t(h.t[lane]) < distance)
-        })
-    })
 }

@@ -3,7 +3,6 @@
 
 use super::entry::Entry;
 use super::instance_filter::InstanceFilter;
-use super::layout::wide::ChildRef;
 use super::options::Robustness;
 use super::placement::ORDINARY_LENGTHS;
 use super::placement::Placement;
@@ -21,13 +20,11 @@ use std::cell::RefCell;
 pub(super) struct TraversalScratch {
     /// Packets against instances' boxes and against triangles.
     pub(super) outer: Box<Packet>,
-    inner: Box<Packet>,
+    pub(super) inner: Box<Packet>,
     /// A packet's rays in an instance's local space, and how far their origins were moved.
-    local: Vec<RayBlock>,
-    moved: Vec<[f64; LANES]>,
-    local_hits: Vec<HitBlock>,
-    pub(super) candidates: Vec<(f32, ChildRef)>,
-    pub(super) order: Vec<(f32, u32)>,
+    pub(super) local: Vec<RayBlock>,
+    pub(super) moved: Vec<[f64; LANES]>,
+    pub(super) local_hits: Vec<HitBlock>,
 }
 
 thread_local! {
@@ -37,8 +34,6 @@ thread_local! {
         local: Vec::new(),
         moved: Vec::new(),
         local_hits: Vec::new(),
-        candidates: Vec::new(),
-        order: Vec::new(),
     });
 }
 
@@ -365,22 +360,14 @@ impl World {
         scratch.local.resize(n, RayBlock::INACTIVE);
         scratch.moved.resize(n, [0.0; LANES]);
         scratch.local_hits.resize(n, HitBlock::MISS);
-        to_local_space(placement, rays, hits, Q::ANY, &mut scratch.local, &mut scratch.moved);
+        let (local, moved) = (&mut scratch.local[..n], &mut scratch.moved[..n]);
+        to_local_space::<S, Q>(simd, placement, rays, hits, local, moved);
         let local_hits = &mut scratch.local_hits[..n];
         local_hits.fill(HitBlock::MISS);
         let local = &scratch.local[..n];
         trace_tree::<S, T, Q>(simd, entry, local, local_hits, filter, &mut scratch.inner);
         for ((h, new), moved) in hits.iter_mut().zip(local_hits).zip(&scratch.moved) {
-            for lane in 0..LANES {
-                let Some(mut c) = new.get(lane) else { continue };
-                if moved[lane] != 0.0 {
-                    c.t = (c.t as f64 + moved[lane]) as f32;
-                }
-                let tie = c.t == h.t[lane] && c.instance < h.instance[lane];
-                if Q::ANY || c.t < h.t[lane] || tie {
-                    h.set(lane, Some(c));
-                }
-            }
+            merge_hits::<Q>(h, new, moved, u16::MAX);
         }
     }
 }
@@ -407,38 +394,67 @@ fn any_unusual_length<S: Simd>(simd: S, rays: &[RayBlock]) -> bool {
 }
 
 /// The rays in an instance's local space, limited to what is nearer than `hits`.
-fn to_local_space(
+#[inline(never)]
+fn to_local_space<S: Simd, Q: HitQuery>(
+    simd: S,
     placement: &Placement,
     rays: &[RayBlock],
     hits: &[HitBlock],
-    any: bool,
     local: &mut [RayBlock],
     moved: &mut [[f64; LANES]],
 ) {
-    for (((r, h), out), moved) in rays.iter().zip(hits).zip(local).zip(moved) {
-        for lane in 0..LANES {
-            let mut ray = r.get(lane);
-            let found = h.prim[lane] != NO_HIT;
-            if found {
-                // One ulp past the best: a tie may go to this instance. Blocked shadow rays are
-                // finished.
-                ray.t_max = if any { -1.0 } else { h.t[lane].next_up().min(ray.t_max) };
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            for (((r, h), local), moved) in rays.iter().zip(hits).zip(local).zip(moved) {
+                let limits = limits_of::<Q>(r, h);
+                placement.enter_block(r, r.active_lanes(), &limits, local, moved);
             }
-            if !ray.is_valid() {
-                out.t_max[lane] = -1.0;
-                out.t_min[lane] = 0.0;
-                continue;
-            }
-            let (l, m) = placement.enter(&ray);
-            out.set(lane, &l);
-            moved[lane] = m;
-        }
+        },
+    );
+}
+
+/// The distances up to which rays with these hits have to search.
+#[inline(always)]
+pub(super) fn limits_of<Q: HitQuery>(rays: &RayBlock, hits: &HitBlock) -> [f32; LANES] {
+    std::array::from_fn(|lane| {
+        let found = hits.prim[lane] != NO_HIT;
+        // One ulp past the best: a tie may go to an instance with a lower number. Blocked shadow
+        // rays are finished.
+        let limit = if Q::ANY { -1.0 } else { hits.t[lane].next_up().min(rays.t_max[lane]) };
+        if found { limit } else { rays.t_max[lane] }
+    })
+}
+
+/// Merges the hits of `lanes` in one entry, of rays that were moved by `moved`, into `hits`.
+/// Returns the lanes with a nearer hit.
+#[inline(always)]
+pub(super) fn merge_hits<Q: HitQuery>(
+    hits: &mut HitBlock,
+    new: &HitBlock,
+    moved: &[f64; LANES],
+    lanes: u16,
+) -> u16 {
+    let mut nearer = 0u16;
+    for lane in 0..LANES {
+        let found = (lanes >> lane & 1 == 1) & (new.prim[lane] != NO_HIT);
+        let by = moved[lane];
+        let t = if by != 0.0 { (f64::from(new.t[lane]) + by) as f32 } else { new.t[lane] };
+        let tie = (t == hits.t[lane]) & (new.instance[lane] < hits.instance[lane]);
+        let better = found & (Q::ANY | (t < hits.t[lane]) | tie);
+        nearer |= u16::from(better) << lane;
+        hits.t[lane] = if better { t } else { hits.t[lane] };
+        hits.u[lane] = if better { new.u[lane] } else { hits.u[lane] };
+        hits.v[lane] = if better { new.v[lane] } else { hits.v[lane] };
+        hits.prim[lane] = if better { new.prim[lane] } else { hits.prim[lane] };
+        hits.instance[lane] = if better { new.instance[lane] } else { hits.instance[lane] };
     }
+    nearer
 }
 
 /// Blocks in local space against one entry: as one packet when the rays agree in octant and
 /// dominant axis, else in smaller packets, else one by one.
-fn trace_tree<S: Simd, T: TriangleTest, Q: HitQuery>(
+pub(super) fn trace_tree<S: Simd, T: TriangleTest, Q: HitQuery>(
     simd: S,
     entry: Entry<'_>,
     rays: &[RayBlock],

@@ -12,6 +12,7 @@
 //! The triangle test does the same operations in the same order as the test for single rays, so
 //! both give the same bits.
 
+mod entries;
 mod load;
 mod strategy;
 mod switch_to_single;
@@ -24,6 +25,7 @@ use crate::bvh::query::{HitQuery, TriangleTest};
 use crate::bvh::traverse::single::RaySetup;
 use crate::bvh::traverse::tree_view::TreeView;
 use crate::ray::{HitBlock, LANES, NO_HIT};
+pub(crate) use entries::{PacketEntries, RaysLeft};
 use fearless_simd::{Select, Simd, SimdBase, SimdMask, f32x16, mask32x16, u32x16};
 pub(crate) use load::PacketLimits;
 use strategy::{Strategy, StrategyChoice};
@@ -191,17 +193,6 @@ impl Packet {
         let choice = &mut self.choices[Q::ANY as usize][self.common_origin as usize];
         choice.learn(strategy, counts, seconds / groups);
     }
-
-    /// Collects the leaves of a hierarchy that some group of the packet may reach before its limit,
-    /// each with the distance to its box.
-    pub(crate) fn collect<S: Simd>(
-        &mut self,
-        simd: S,
-        tree: &TreeView<'_>,
-        out: &mut Vec<(f32, ChildRef)>,
-    ) {
-        self.walk::<S, _, IntervalsOnly>(simd, tree, &mut CollectLeaves(out), 0);
-    }
 }
 
 /// Where the rays of a packet start.
@@ -249,8 +240,8 @@ trait PacketLeaf<S: Simd> {
     /// Where the rays start.
     type Origin: PacketOrigin;
 
-    /// Tests the leaf for the groups `reached`, whose bounds intersect its box, at `distance` at
-    /// the nearest. Returns the groups whose limits changed.
+    /// Tests the leaf for the groups `reached`, whose bounds intersect its box; with per-ray tests,
+    /// `lanes` are the rays that do. Returns the groups whose limits changed.
     fn leaf(
         &mut self,
         packet: &mut Packet,
@@ -258,7 +249,7 @@ trait PacketLeaf<S: Simd> {
         units: &[Unit],
         leaf: ChildRef,
         reached: u16,
-        distance: f32,
+        lanes: &[u16; LANES],
     ) -> u16;
 
     /// Traces one by one the few rays that hit an inner node's box: `lanes` of the groups
@@ -272,38 +263,6 @@ trait PacketLeaf<S: Simd> {
         reached: u16,
         lanes: &[u16; LANES],
     ) -> u16;
-}
-
-struct CollectLeaves<'a>(&'a mut Vec<(f32, ChildRef)>);
-
-impl<S: Simd> PacketLeaf<S> for CollectLeaves<'_> {
-    type Origin = SeparateOrigins;
-
-    #[inline(always)]
-    fn leaf(
-        &mut self,
-        _: &mut Packet,
-        _: S,
-        _: &[Unit],
-        leaf: ChildRef,
-        _: u16,
-        distance: f32,
-    ) -> u16 {
-        self.0.push((distance, leaf));
-        0
-    }
-
-    fn switch_to_single(
-        &mut self,
-        _: &mut Packet,
-        _: S,
-        _: &TreeView<'_>,
-        _: ChildRef,
-        _: u16,
-        _: &[u16; LANES],
-    ) -> u16 {
-        unreachable!("leaves are collected without the rays' own tests")
-    }
 }
 
 /// One row of a packet as a vector.

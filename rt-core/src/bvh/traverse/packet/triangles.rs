@@ -32,7 +32,7 @@ impl<S: Simd, T: TriangleTest, Q: HitQuery, O: PacketOrigin> PacketLeaf<S> for T
         units: &[Unit],
         leaf: ChildRef,
         reached: u16,
-        _: f32,
+        _: &[u16; LANES],
     ) -> u16 {
         packet.triangles::<S, T, Q, O>(simd, units, leaf, reached)
     }

@@ -234,7 +234,7 @@ impl Packet {
                 let changed = if B::PER_RAY && !child.is_leaf() {
                     leaves.switch_to_single(self, simd, tree, child, reached, &lanes)
                 } else {
-                    leaves.leaf(self, simd, units, child, reached, distance)
+                    leaves.leaf(self, simd, units, child, reached, &lanes)
                 };
                 if changed != 0 {
                     let mut rest = changed;

@@ -1,0 +1,139 @@
+//! A packet of rays through the entries of the upper level that they meet.
+
+use super::blas::leaf_primitive_ids;
+use super::entry::Entry;
+use super::instance_filter::InstanceFilter;
+use super::layout::wide::{ChildRef, Unit};
+use super::query::{HitQuery, TriangleTest};
+use super::streams::{limits_of, merge_hits, trace_tree};
+use super::world::World;
+use crate::bvh::traverse::incoherent;
+use crate::bvh::traverse::packet::{GROUPS, Packet, PacketEntries, RaysLeft};
+use crate::ray::{HitBlock, LANES, RayBlock};
+use fearless_simd::Simd;
+use std::marker::PhantomData;
+
+/// With fewer groups of sixteen rays, each goes through an entry by itself.
+const FEWEST_GROUPS: usize = 3;
+
+/// Buffers of [`GROUPS`] blocks each.
+pub(super) struct EntryRoom<'a> {
+    pub(super) packet: &'a mut Packet,
+    pub(super) local: &'a mut [RayBlock],
+    pub(super) moved: &'a mut [[f64; LANES]],
+    pub(super) local_hits: &'a mut [HitBlock],
+}
+
+/// A packet on its way through the upper level.
+pub(super) struct EntryPackets<'a, T, Q> {
+    world: &'a World,
+    rays: &'a [RayBlock],
+    hits: &'a mut [HitBlock],
+    filter: InstanceFilter<'a>,
+    room: EntryRoom<'a>,
+    kind: PhantomData<(T, Q)>,
+}
+
+impl<'a, T, Q> EntryPackets<'a, T, Q> {
+    pub(super) fn new(
+        world: &'a World,
+        rays: &'a [RayBlock],
+        hits: &'a mut [HitBlock],
+        filter: InstanceFilter<'a>,
+        room: EntryRoom<'a>,
+    ) -> Self {
+        EntryPackets { world, rays, hits, filter, room, kind: PhantomData }
+    }
+}
+
+impl<S: Simd, T: TriangleTest, Q: HitQuery> PacketEntries<S> for EntryPackets<'_, T, Q> {
+    type Query = Q;
+
+    #[inline(always)]
+    fn leaf(
+        &mut self,
+        simd: S,
+        units: &[Unit],
+        leaf: ChildRef,
+        reached: u16,
+        lanes: &[u16; LANES],
+        left: RaysLeft<'_>,
+    ) -> u16 {
+        let mut changed = 0;
+        for &id in leaf_primitive_ids(units, leaf) {
+            if self.world.allows(self.filter, id) {
+                let of_entry = self.enter(simd, self.world.entry(id), reached, lanes);
+                for g in groups_of(of_entry) {
+                    changed |= 1 << g;
+                    for lane in 0..LANES {
+                        if self.hits[g].prim[lane] == crate::ray::NO_HIT {
+                            continue;
+                        }
+                        if Q::ANY {
+                            left.active[g] &= !(1 << lane);
+                            left.t[g][lane] = -1.0;
+                        } else {
+                            left.t[g][lane] = self.hits[g].t[lane];
+                        }
+                    }
+                }
+            }
+        }
+        changed
+    }
+}
+
+impl<T: TriangleTest, Q: HitQuery> EntryPackets<'_, T, Q> {
+    /// The rays `lanes` of the groups `reached` through one entry. Returns the groups with nearer
+    /// hits.
+    #[inline(always)]
+    fn enter<S: Simd>(
+        &mut self,
+        simd: S,
+        entry: Entry<'_>,
+        reached: u16,
+        lanes: &[u16; LANES],
+    ) -> u16 {
+        let EntryRoom { packet, local, moved, local_hits } = &mut self.room;
+        let (mut n, mut entered) = (0, [(0, 0); GROUPS]);
+        for g in groups_of(reached) {
+            let limits = limits_of::<Q>(&self.rays[g], &self.hits[g]);
+            let (local, moved) = (&mut local[n & 15], &mut moved[n & 15]);
+            let inside =
+                entry.placement().enter_block(&self.rays[g], lanes[g], &limits, local, moved);
+            if inside != 0 {
+                entered[n & 15] = (g, inside);
+                n += 1;
+            }
+        }
+        let (local, local_hits) = (&local[..n], &mut local_hits[..n]);
+        local_hits.fill(HitBlock::MISS);
+        match entry.triangles(self.filter) {
+            Some(tree) if n < FEWEST_GROUPS => {
+                incoherent::trace::<S, T, Q>(simd, &tree, local, local_hits, entry.number());
+                if !Q::ANY {
+                    entry.resolve(local_hits);
+                }
+            }
+            _ => trace_tree::<S, T, Q>(simd, entry, local, local_hits, self.filter, packet),
+        }
+        let mut changed = 0;
+        for (i, &(g, inside)) in entered[..n].iter().enumerate() {
+            let nearer = merge_hits::<Q>(&mut self.hits[g], &local_hits[i], &moved[i], inside);
+            changed |= u16::from(nearer != 0) << g;
+        }
+        changed
+    }
+}
+
+/// The numbers of the groups in a mask.
+#[inline(always)]
+fn groups_of(mut mask: u16) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        (mask != 0).then(|| {
+            let g = mask.trailing_zeros() as usize & 15;
+            mask &= mask - 1;
+            g
+        })
+    })
+}
