@@ -42,6 +42,10 @@ impl Ray {
         self.origin + self.dir * t
     }
 
+    /// A ray whose numbers are written before it is traced. It meets nothing.
+    pub(crate) const UNSET: Ray =
+        Ray { origin: Vec3::ZERO, dir: Vec3::ZERO, t_min: 0.0, t_max: 0.0 };
+
     /// Whether the ray can hit anything: false for an empty range or NaN. Such rays are answered
     /// with "no hit" without traversal.
     #[inline]

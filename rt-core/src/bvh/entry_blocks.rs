@@ -1,6 +1,5 @@
 //! Sixteen rays through the entries of the upper level that they meet.
 
-use super::blas::leaf_primitive_ids;
 use super::entry::Entry;
 use super::instance_filter::InstanceFilter;
 use super::layout::wide::{ChildRef, Unit};
@@ -49,10 +48,9 @@ impl<S: Simd, T: TriangleTest, Q: HitQuery> BlockEntries<S> for EntryBlocks<'_, 
         t: &mut [f32; LANES],
         active: &mut u16,
     ) {
-        for &id in leaf_primitive_ids(units, leaf) {
-            if self.world.allows(self.filter, id) {
-                self.enter(simd, self.world.entry(id), lanes & *active, t, active);
-            }
+        let world = self.world;
+        if let Some(entry) = world.entry_of_leaf(units, leaf, self.filter) {
+            self.enter(simd, entry, lanes & *active, t, active);
         }
     }
 }

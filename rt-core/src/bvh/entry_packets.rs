@@ -1,6 +1,5 @@
 //! A packet of rays through the entries of the upper level that they meet.
 
-use super::blas::leaf_primitive_ids;
 use super::entry::Entry;
 use super::instance_filter::InstanceFilter;
 use super::layout::wide::{ChildRef, Unit};
@@ -9,7 +8,7 @@ use super::streams::{limits_of, merge_hits, trace_tree};
 use super::world::World;
 use crate::bvh::traverse::incoherent;
 use crate::bvh::traverse::packet::{GROUPS, Packet, PacketEntries, RaysLeft};
-use crate::ray::{HitBlock, LANES, RayBlock};
+use crate::ray::{HitBlock, LANES, NO_HIT, RayBlock};
 use fearless_simd::Simd;
 use std::marker::PhantomData;
 
@@ -59,24 +58,16 @@ impl<S: Simd, T: TriangleTest, Q: HitQuery> PacketEntries<S> for EntryPackets<'_
         lanes: &[u16; LANES],
         left: RaysLeft<'_>,
     ) -> u16 {
-        let mut changed = 0;
-        for &id in leaf_primitive_ids(units, leaf) {
-            if self.world.allows(self.filter, id) {
-                let of_entry = self.enter(simd, self.world.entry(id), reached, lanes);
-                for g in groups_of(of_entry) {
-                    changed |= 1 << g;
-                    for lane in 0..LANES {
-                        if self.hits[g].prim[lane] == crate::ray::NO_HIT {
-                            continue;
-                        }
-                        if Q::ANY {
-                            left.active[g] &= !(1 << lane);
-                            left.t[g][lane] = -1.0;
-                        } else {
-                            left.t[g][lane] = self.hits[g].t[lane];
-                        }
-                    }
-                }
+        let world = self.world;
+        let Some(entry) = world.entry_of_leaf(units, leaf, self.filter) else { return 0 };
+        let changed = self.enter(simd, entry, reached, lanes);
+        for g in groups_of(changed) {
+            let hits = &self.hits[g];
+            for lane in 0..LANES {
+                let found = hits.prim[lane] != NO_HIT;
+                let t = if Q::ANY { -1.0 } else { hits.t[lane] };
+                left.t[g][lane] = if found { t } else { left.t[g][lane] };
+                left.active[g] &= !(u16::from(Q::ANY & found) << lane);
             }
         }
         changed

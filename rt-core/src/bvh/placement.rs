@@ -1,6 +1,7 @@
 //! Transforms rays from render space to a geometry's local space, and hits back.
 
 use super::layout::local_frame::LocalFrame;
+use super::layout::wide::{ChildRef, Unit};
 use crate::bvh::traverse::packet::PacketLimits;
 use crate::math::{Aabb, max_abs};
 use crate::ray::{LANES, Ray, RayBlock};
@@ -16,23 +17,35 @@ pub(super) const ORDINARY_LENGTHS: std::ops::RangeInclusive<f32> = 1e-4..=1e4;
 const FAR_RADII: f64 = 64.0;
 
 /// The transform into one instance's local space.
-#[derive(Debug, Clone, Copy)]
+///
+/// The leaves of the upper level hold copies: what a ray needs to enter an instance lies beside the
+/// boxes that it has just passed. (Measured: rays among 20,000 instances waited an eighth of their
+/// time for a placement in an array of its own.)
+#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
 pub(crate) struct Placement {
+    /// Number of the entry in the upper level, set in its leaf. It comes first: there, it is the
+    /// leaf's only primitive.
+    number: u32,
     /// Index of the geometry.
-    pub(crate) geometry: usize,
-    local_from_render: DAffine3,
-    /// Local and render space are the same.
-    identity: bool,
-    /// Sphere around the local bounds.
-    center: DVec3,
-    radius: f64,
-    /// The centre, and the distance within which an origin is near, in f32 with a margin that
+    geometry: u32,
+    /// 1 when local and render space are the same.
+    identity: u32,
+    /// The distance from the centre within which an origin is near, in f32 with a margin that
     /// covers its rounding.
-    center_f32: Vec3,
     near_f32: f32,
-    /// Bounds in render space.
-    pub(crate) bounds: Aabb,
+    center_f32: Vec3,
+    unused: [u32; 3],
+    /// Sphere around the local bounds.
+    radius: f64,
+    center: DVec3,
+    local_from_render: DAffine3,
+    /// Bounds in render space: smallest and largest corner.
+    bounds: [Vec3; 2],
 }
+
+/// Units of a placement in a leaf.
+pub(super) const PLACEMENT_UNITS: usize = size_of::<Placement>() / size_of::<Unit>();
 
 impl Placement {
     /// `world_origin` is the world position of render space's origin. `reach` are the local bounds
@@ -86,15 +99,42 @@ impl Placement {
         };
         let (center_f32, near_f32) = (center.as_vec3(), (0.99 * FAR_RADII * radius) as f32);
         Some(Placement {
-            geometry,
-            local_from_render,
-            identity,
-            center,
-            radius,
-            center_f32,
+            number: 0,
+            geometry: geometry as u32,
+            identity: u32::from(identity),
             near_f32,
-            bounds,
+            center_f32,
+            unused: [0; 3],
+            radius,
+            center,
+            local_from_render,
+            bounds: [bounds.min, bounds.max],
         })
+    }
+
+    /// Writes the placement of entry `number` into a leaf of the upper level.
+    pub(super) fn write(&self, number: u32, leaf: &mut [Unit]) {
+        let placed: &mut [Placement] = bytemuck::cast_slice_mut(leaf);
+        placed[0] = Placement { number, ..*self };
+    }
+
+    /// The placement in a leaf of the upper level, and the number of its entry.
+    #[inline(always)]
+    pub(super) fn of_leaf(units: &[Unit], leaf: ChildRef) -> (&Placement, u32) {
+        let at = leaf.unit();
+        let placed: &[Placement] = bytemuck::cast_slice(&units[at..at + PLACEMENT_UNITS]);
+        (&placed[0], placed[0].number)
+    }
+
+    /// Index of the geometry.
+    #[inline]
+    pub(super) fn geometry(&self) -> usize {
+        self.geometry as usize
+    }
+
+    /// Bounds in render space.
+    pub(super) fn bounds(&self) -> Aabb {
+        Aabb::new(self.bounds[0], self.bounds[1])
     }
 
     /// The transform from render space to local space.
@@ -102,16 +142,21 @@ impl Placement {
         self.local_from_render
     }
 
+    #[inline(always)]
+    fn is_identity(&self) -> bool {
+        self.identity != 0
+    }
+
     /// True when this ray needs no transformation.
     #[inline]
     pub(crate) fn accepts(&self, ray: &Ray) -> bool {
-        self.identity && max_abs(ray.origin - self.center_f32) <= self.near_f32
+        self.is_identity() && max_abs(ray.origin - self.center_f32) <= self.near_f32
     }
 
     /// The rays that need no transformation and no rescaling; `None` when all do.
     pub(crate) fn limits(&self) -> Option<PacketLimits> {
         let length = (*ORDINARY_LENGTHS.start(), *ORDINARY_LENGTHS.end());
-        self.identity.then(|| PacketLimits {
+        self.is_identity().then(|| PacketLimits {
             length,
             center: self.center_f32.to_array(),
             reach: self.near_f32,
@@ -122,7 +167,7 @@ impl Placement {
     /// far away.
     #[inline(never)]
     pub(crate) fn accepts_blocks<S: Simd>(&self, simd: S, rays: &[RayBlock]) -> bool {
-        if !self.identity {
+        if !self.is_identity() {
             return false;
         }
         simd.vectorize(
@@ -145,26 +190,44 @@ impl Placement {
         )
     }
 
-    /// The ray in local space, and how far along it its origin was moved (in units of its
-    /// direction: `t` is the same in both spaces).
-    #[inline]
-    pub(crate) fn enter(&self, ray: &Ray) -> (Ray, f64) {
+    /// Writes `ray`, limited to `t_max`, to `local` in local space. Returns how far along it its
+    /// origin was moved (in units of its direction: `t` is the same in both spaces).
+    ///
+    /// Each number is written once and by itself. Copies of whole rays read what was just written
+    /// in other pieces, and the processor waits for that: a quarter of the time of rays that enter
+    /// many instances.
+    #[inline(always)]
+    pub(crate) fn enter(&self, ray: &Ray, t_max: f32, local: &mut Ray) -> f64 {
+        local.t_min = ray.t_min;
+        local.t_max = t_max;
         if self.accepts(ray) {
-            return (*ray, 0.0);
+            local.origin = ray.origin;
+            local.dir = ray.dir;
+            return 0.0;
         }
-        let near = |o: DVec3| (o - self.center).abs().max_element() <= FAR_RADII * self.radius;
         let o = self.local_from_render.transform_point3(ray.origin.as_dvec3());
         let d = self.local_from_render.transform_vector3(ray.dir.as_dvec3());
-        let moved = if near(o) { 0.0 } else { distance_to_sphere(o, d, self.center, self.radius) };
-        let (t_min, t_max) = if moved == 0.0 {
-            (ray.t_min, ray.t_max)
-        } else {
+        local.origin = o.as_vec3();
+        local.dir = d.as_vec3();
+        if (o - self.center).abs().max_element() <= FAR_RADII * self.radius {
+            return 0.0;
+        }
+        self.move_closer(o, d, local)
+    }
+
+    /// Moves a ray with the local origin `o` and direction `d` from afar to the geometry.
+    #[cold]
+    #[inline(never)]
+    fn move_closer(&self, o: DVec3, d: DVec3, local: &mut Ray) -> f64 {
+        let moved = distance_to_sphere(o, d, self.center, self.radius);
+        if moved != 0.0 {
+            local.origin = (o + d * moved).as_vec3();
             // A moved ray starts before the geometry, so that no part of it is lost when t_min is
             // negative after the move.
-            (moved_limit(ray.t_min, moved).max(0.0), moved_limit(ray.t_max, moved))
-        };
-        let local = Ray { origin: (o + d * moved).as_vec3(), dir: d.as_vec3(), t_min, t_max };
-        (local, moved)
+            local.t_min = moved_limit(local.t_min, moved).max(0.0);
+            local.t_max = moved_limit(local.t_max, moved);
+        }
+        moved
     }
 
     /// [`Placement::enter`] for the rays in `lanes` of a block, each up to its `t_max`: the same
@@ -180,7 +243,7 @@ impl Placement {
         moved: &mut [f64; LANES],
     ) -> u16 {
         let mut far = [false; LANES];
-        if self.identity {
+        if self.is_identity() {
             *local = *rays;
             for lane in 0..LANES {
                 let origin = Vec3::new(rays.ox[lane], rays.oy[lane], rays.oz[lane]);
@@ -217,9 +280,9 @@ impl Placement {
         while outside != 0 {
             let lane = outside.trailing_zeros() as usize & 15;
             outside &= outside - 1;
-            let (ray, by) = self.enter(&Ray { t_max: t_max[lane], ..rays.get(lane) });
+            let mut ray = Ray::UNSET;
+            moved[lane] = self.enter(&rays.get(lane), t_max[lane], &mut ray);
             local.set(lane, &ray);
-            moved[lane] = by;
             inside &= !(1 << lane);
             inside |= u16::from(ray.t_max > ray.t_min) << lane;
         }

@@ -325,13 +325,14 @@ impl World {
                     continue;
                 }
                 count(Counter::Fallbacks, 1);
-                let (ray, unit) = with_ordinary_length(&ray);
+                let mut room = Ray::UNSET;
+                let (ray, unit) = with_ordinary_length(&ray, &mut room);
                 if Q::ANY {
-                    if self.occluded_in::<S, T>(simd, &ray, filter) {
+                    if self.occluded_in::<S, T>(simd, ray, filter) {
                         h.prim[lane] = 0;
                     }
                 } else {
-                    let hit = self.closest_in::<S, T>(simd, &ray, filter);
+                    let hit = self.closest_in::<S, T>(simd, ray, filter);
                     h.set(lane, hit.map(|c| Hit { t: c.t * unit, ..c }));
                 }
             }

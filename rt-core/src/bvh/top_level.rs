@@ -4,10 +4,10 @@ use super::blas::Blas;
 use super::build::{LeafCapacity, PrimRef, Progress, build_wide};
 use super::error::BuildError;
 use super::geometry::Instance;
-use super::layout::wide::{LeafWriter, Unit, WideBvh, write_id_leaf};
+use super::layout::wide::{LeafWriter, Unit, WideBvh};
 use super::mesh_group::{GroupChoice, MeshGroup};
 use super::options::BuildQuality;
-use super::placement::Placement;
+use super::placement::{PLACEMENT_UNITS, Placement};
 use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -27,16 +27,30 @@ pub(super) struct TopLevel {
 /// through the upper level, they would share no work.
 const MOST_IN_TURN: usize = 4;
 
-/// Leaves of one instance each. An instance is entered only if a ray meets its own box: with four
-/// in a leaf, a ray was moved into the space of all four where it met the box around them.
-struct InstanceWriter;
+/// Leaves of one entry each, with its placement. An instance is entered only if a ray meets its own
+/// box: with four in a leaf, a ray was moved into the space of all four where it met the box around
+/// them.
+struct EntryWriter<'a> {
+    placements: &'a [Placement],
+    group: Option<&'a MeshGroup>,
+}
 
-impl LeafWriter for InstanceWriter {
-    const UNITS: usize = 1;
+impl EntryWriter<'_> {
+    fn placement(&self, id: usize) -> Option<&Placement> {
+        self.placements.get(id).or_else(|| self.group.map(|g| &g.placement))
+    }
+}
+
+impl LeafWriter for EntryWriter<'_> {
+    const UNITS: usize = PLACEMENT_UNITS;
     const CAPACITY: usize = 1;
 
     fn write(&self, prims: &[u32], out: &mut [Unit]) {
-        write_id_leaf(out, prims.iter().copied());
+        for &id in prims {
+            if let Some(placement) = self.placement(id as usize) {
+                placement.write(id, out);
+            }
+        }
     }
 }
 
@@ -63,14 +77,15 @@ pub(super) fn build_top_level(
     let placed: Vec<_> =
         instances.par_iter().enumerate().with_min_len(1024).map(place_one).collect();
     let placements = placed.into_iter().collect::<Result<Vec<_>, _>>()?;
-    let alone = |p: &Placement| blas[p.geometry].bvh().is_some();
+    let alone = |p: &Placement| blas[p.geometry()].bvh().is_some();
     let entries = placements.iter().enumerate().filter(|(_, p)| alone(p));
     let entries = entries.chain(group.map(|g| (placements.len(), &g.placement)));
     let refs: Vec<PrimRef> = entries
         .filter(|(_, p)| {
-            !p.bounds.is_empty() && p.bounds.min.is_finite() && p.bounds.max.is_finite()
+            let b = p.bounds();
+            !b.is_empty() && b.min.is_finite() && b.max.is_finite()
         })
-        .map(|(id, p)| PrimRef::new(p.bounds, id as u32))
+        .map(|(id, p)| PrimRef::new(p.bounds(), id as u32))
         .collect();
     let only = match (instances, refs.as_slice()) {
         ([_], _) => Some(0),
@@ -84,7 +99,8 @@ pub(super) fn build_top_level(
     };
     let mut config = BuildQuality::Balanced.config();
     config.sah.leaves = LeafCapacity::One;
-    let tlas = build_wide(refs, &InstanceWriter, config, notes, progress)?;
+    let writer = EntryWriter { placements: &placements, group };
+    let tlas = build_wide(refs, &writer, config, notes, progress)?;
     Ok(TopLevel { placements, tlas, only, few })
 }
 

@@ -10,6 +10,7 @@ use super::layout::wide::{
     CHILD_ROW, ChildRef, MAX_DEPTH, NODE_UNITS, Unit, WIDTH, WideBvh, get_box,
 };
 use super::mesh_group::MeshGroup;
+use super::placement::PLACEMENT_UNITS;
 use super::traverse::tree_view::NO_OWNER;
 use super::world::World;
 use crate::math::Aabb;
@@ -58,12 +59,12 @@ impl World {
         }
         let entries = self.placements.len() + usize::from(self.group.is_some());
         let mut seen = vec![false; entries];
-        let instances = TreeWalker::new(&self.tlas, 1);
+        let instances = TreeWalker::new(&self.tlas, PLACEMENT_UNITS);
         instances
             .run(|leaf| {
                 let ids = leaf_primitive_ids(&self.tlas.units, leaf).to_vec();
                 mark(&mut seen, &ids)?;
-                Ok(ids.iter().map(|&id| self.entry(id).placement().bounds).collect())
+                Ok(ids.iter().map(|&id| self.entry(id).placement().bounds()).collect())
             })
             .map_err(|fault| InvalidTree { tree: "instances".into(), fault })?;
         Ok(stats)

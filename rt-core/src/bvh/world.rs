@@ -2,7 +2,7 @@
 
 mod build;
 
-use super::blas::{Blas, leaf_primitive_ids};
+use super::blas::Blas;
 use super::build::UNWATCHED;
 use super::entry::Entry;
 use super::geometry::{Geometry, Instance};
@@ -70,9 +70,31 @@ impl World {
             (None, Some(group)) => Entry::Group(group),
             _ => {
                 let placement = &self.placements[id as usize];
-                let blas = &self.blas[placement.geometry];
+                let blas = &self.blas[placement.geometry()];
                 Entry::Instance { number: id, placement, blas }
             }
+        }
+    }
+
+    /// The entry in a leaf of the upper level; `None` when `filter` does not allow it.
+    #[inline(always)]
+    pub(super) fn entry_of_leaf<'w>(
+        &'w self,
+        units: &'w [Unit],
+        leaf: ChildRef,
+        filter: InstanceFilter<'_>,
+    ) -> Option<Entry<'w>> {
+        let (placement, number) = Placement::of_leaf(units, leaf);
+        if !self.allows(filter, number) {
+            return None;
+        }
+        match &self.group {
+            Some(group) if number as usize >= self.placements.len() => Some(Entry::Group(group)),
+            _ => Some(Entry::Instance {
+                number,
+                placement,
+                blas: self.blas.get(placement.geometry())?,
+            }),
         }
     }
 
@@ -145,18 +167,19 @@ impl World {
         if !ray.is_valid() {
             return None;
         }
-        let (ray, unit) = with_ordinary_length(ray);
+        let mut room = Ray::UNSET;
+        let (ray, unit) = with_ordinary_length(ray, &mut room);
         let hit = match self.robustness {
             Robustness::Fast => {
                 dispatch!(
                     self.level,
-                    simd => self.closest_in::<_, FastTest>(simd, &ray, InstanceFilter::All)
+                    simd => self.closest_in::<_, FastTest>(simd, ray, InstanceFilter::All)
                 )
             }
             Robustness::Watertight => {
                 dispatch!(
                     self.level,
-                    simd => self.closest_in::<_, WatertightTest>(simd, &ray, InstanceFilter::All)
+                    simd => self.closest_in::<_, WatertightTest>(simd, ray, InstanceFilter::All)
                 )
             }
         };
@@ -168,18 +191,19 @@ impl World {
         if !ray.is_valid() {
             return false;
         }
-        let (ray, _) = with_ordinary_length(ray);
+        let mut room = Ray::UNSET;
+        let (ray, _) = with_ordinary_length(ray, &mut room);
         match self.robustness {
             Robustness::Fast => {
                 dispatch!(
                     self.level,
-                    simd => self.occluded_in::<_, FastTest>(simd, &ray, InstanceFilter::All)
+                    simd => self.occluded_in::<_, FastTest>(simd, ray, InstanceFilter::All)
                 )
             }
             Robustness::Watertight => {
                 dispatch!(
                     self.level,
-                    simd => self.occluded_in::<_, WatertightTest>(simd, &ray, InstanceFilter::All)
+                    simd => self.occluded_in::<_, WatertightTest>(simd, ray, InstanceFilter::All)
                 )
             }
         }
@@ -192,7 +216,7 @@ impl World {
         ray: &Ray,
         filter: InstanceFilter<'_>,
     ) -> Option<Hit> {
-        let mut leaves = InstanceClosest::<T>::new(self, *ray, filter);
+        let mut leaves = InstanceClosest::<T>::new(self, ray, filter);
         match self.only {
             Some(id) if !self.allows(filter, id) => return None,
             Some(id) => {
@@ -201,7 +225,7 @@ impl World {
                     return only.closest::<S, T>(simd, ray, filter);
                 }
                 let mut t_max = ray.t_max;
-                leaves.try_entry(simd, id, &mut t_max);
+                leaves.try_entry(simd, only, &mut t_max);
             }
             None => {
                 let setup = RaySetup::new(ray);
@@ -219,33 +243,35 @@ impl World {
         filter: InstanceFilter<'_>,
     ) -> bool {
         if let Some(id) = self.only {
-            return self.allows(filter, id) && self.entry_occluded::<S, T>(simd, id, ray, filter);
+            return self.allows(filter, id) && occludes::<S, T>(simd, self.entry(id), ray, filter);
         }
-        let mut leaves = InstanceAny::<T>::new(self, *ray, filter);
+        let mut leaves = InstanceAny::<T>::new(self, ray, filter);
         let setup = RaySetup::new(ray);
         traverse(simd, &TreeView::all(&self.tlas), &setup, ray.t_max, &mut leaves);
         leaves.found
     }
-
-    fn entry_occluded<S: Simd, T: TriangleTest>(
-        &self,
-        simd: S,
-        id: u32,
-        ray: &Ray,
-        filter: InstanceFilter<'_>,
-    ) -> bool {
-        let entry = self.entry(id);
-        let (local, _) = entry.placement().enter(ray);
-        local.t_max > local.t_min && entry.occluded::<S, T>(simd, &local, filter)
-    }
 }
 
-/// Returns rays whose direction is neither tiny nor huge unchanged; scales others by a power of
-/// two. The second value converts the scaled ray's `t` back.
-pub(super) fn with_ordinary_length(ray: &Ray) -> (Ray, f32) {
+/// Whether an entry blocks a ray in render space.
+#[inline(always)]
+fn occludes<S: Simd, T: TriangleTest>(
+    simd: S,
+    entry: Entry<'_>,
+    ray: &Ray,
+    filter: InstanceFilter<'_>,
+) -> bool {
+    let mut local = Ray::UNSET;
+    entry.placement().enter(ray, ray.t_max, &mut local);
+    local.t_max > local.t_min && entry.occluded::<S, T>(simd, &local, filter)
+}
+
+/// The ray itself when its direction is neither tiny nor huge; else a copy in `room`, scaled by a
+/// power of two. The second value converts the scaled ray's `t` back.
+#[inline]
+pub(super) fn with_ordinary_length<'r>(ray: &'r Ray, room: &'r mut Ray) -> (&'r Ray, f32) {
     let m = max_abs(ray.dir);
     if ORDINARY_LENGTHS.contains(&m) {
-        return (*ray, 1.0);
+        return (ray, 1.0);
     }
     let e = (m.log2().round() as i32).clamp(-125, 125);
     let k = exp2i(-e);
@@ -255,35 +281,34 @@ pub(super) fn with_ordinary_length(ray: &Ray) -> (Ray, f32) {
         if x * k < t { x.next_up() } else { x }
     };
     // Hits whose t overflows f32 are ignored.
-    (
-        Ray {
-            dir: ray.dir * k,
-            t_min: limit(ray.t_min),
-            t_max: limit(ray.t_max.min(f32::MAX)),
-            ..*ray
-        },
-        k,
-    )
+    *room = Ray {
+        dir: ray.dir * k,
+        t_min: limit(ray.t_min),
+        t_max: limit(ray.t_max.min(f32::MAX)),
+        ..*ray
+    };
+    (room, k)
 }
 
 struct InstanceClosest<'w, T: TriangleTest> {
     world: &'w World,
-    ray: Ray,
+    ray: &'w Ray,
     filter: InstanceFilter<'w>,
     best: Option<Hit>,
     test: PhantomData<T>,
 }
 
 impl<'w, T: TriangleTest> InstanceClosest<'w, T> {
-    fn new(world: &'w World, ray: Ray, filter: InstanceFilter<'w>) -> Self {
+    fn new(world: &'w World, ray: &'w Ray, filter: InstanceFilter<'w>) -> Self {
         InstanceClosest { world, ray, filter, best: None, test: PhantomData }
     }
 
-    fn try_entry<S: Simd>(&mut self, simd: S, id: u32, skip_t: &mut f32) {
-        let entry = self.world.entry(id);
+    #[inline(always)]
+    fn try_entry<S: Simd>(&mut self, simd: S, entry: Entry<'_>, skip_t: &mut f32) {
         // One ulp past the best so far: a tie may go to this entry.
         let limit = self.best.map_or(self.ray.t_max, |b| b.t.next_up());
-        let (local, moved) = entry.placement().enter(&Ray { t_max: limit, ..self.ray });
+        let mut local = Ray::UNSET;
+        let moved = entry.placement().enter(self.ray, limit, &mut local);
         if local.t_max <= local.t_min {
             return;
         }
@@ -300,11 +325,10 @@ impl<'w, T: TriangleTest> InstanceClosest<'w, T> {
 impl<S: Simd, T: TriangleTest> LeafTest<S> for InstanceClosest<'_, T> {
     type Query = ClosestHit;
 
+    #[inline(always)]
     fn test(&mut self, simd: S, units: &[Unit], leaf: ChildRef, skip_t: &mut f32) -> bool {
-        let (world, filter) = (self.world, self.filter);
-        let ids = leaf_primitive_ids(units, leaf).iter();
-        for &id in ids.filter(|&&id| world.allows(filter, id)) {
-            self.try_entry(simd, id, skip_t);
+        if let Some(entry) = self.world.entry_of_leaf(units, leaf, self.filter) {
+            self.try_entry(simd, entry, skip_t);
         }
         false
     }
@@ -312,14 +336,14 @@ impl<S: Simd, T: TriangleTest> LeafTest<S> for InstanceClosest<'_, T> {
 
 struct InstanceAny<'w, T: TriangleTest> {
     world: &'w World,
-    ray: Ray,
+    ray: &'w Ray,
     filter: InstanceFilter<'w>,
     found: bool,
     test: PhantomData<T>,
 }
 
 impl<'w, T: TriangleTest> InstanceAny<'w, T> {
-    fn new(world: &'w World, ray: Ray, filter: InstanceFilter<'w>) -> Self {
+    fn new(world: &'w World, ray: &'w Ray, filter: InstanceFilter<'w>) -> Self {
         InstanceAny { world, ray, filter, found: false, test: PhantomData }
     }
 }
@@ -327,12 +351,10 @@ impl<'w, T: TriangleTest> InstanceAny<'w, T> {
 impl<S: Simd, T: TriangleTest> LeafTest<S> for InstanceAny<'_, T> {
     type Query = AnyHit;
 
+    #[inline(always)]
     fn test(&mut self, simd: S, units: &[Unit], leaf: ChildRef, _: &mut f32) -> bool {
-        let (world, ray, filter) = (self.world, self.ray, self.filter);
-        self.found = leaf_primitive_ids(units, leaf)
-            .iter()
-            .filter(|&&id| world.allows(filter, id))
-            .any(|&id| world.entry_occluded::<S, T>(simd, id, &ray, filter));
+        let entry = self.world.entry_of_leaf(units, leaf, self.filter);
+        self.found = entry.is_some_and(|e| occludes::<S, T>(simd, e, self.ray, self.filter));
         self.found
     }
 }

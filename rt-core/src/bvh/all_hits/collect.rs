@@ -42,7 +42,8 @@ impl<'w, F: FnMut(Hit) -> bool> Crossings<'w, F> {
     }
 
     fn search_entry<S: Simd>(&mut self, simd: S, entry: Entry<'_>) {
-        let (ray, moved) = entry.placement().enter(&self.ray);
+        let mut ray = Ray::UNSET;
+        let moved = entry.placement().enter(&self.ray, self.ray.t_max, &mut ray);
         if ray.t_max <= ray.t_min {
             return;
         }
@@ -87,13 +88,10 @@ impl<S: Simd, F: FnMut(Hit) -> bool> LeafTest<S> for Crossings<'_, F> {
     type Query = AnyHit;
 
     fn test(&mut self, simd: S, units: &[Unit], leaf: ChildRef, _: &mut f32) -> bool {
-        for &id in leaf_primitive_ids(units, leaf) {
-            self.search_entry(simd, self.world.entry(id));
-            if self.over {
-                return true;
-            }
+        if let Some(entry) = self.world.entry_of_leaf(units, leaf, InstanceFilter::All) {
+            self.search_entry(simd, entry);
         }
-        false
+        self.over
     }
 }
 

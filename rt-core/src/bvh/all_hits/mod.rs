@@ -167,8 +167,9 @@ impl World {
         if !ray.is_valid() {
             return;
         }
-        let (ray, unit) = with_ordinary_length(ray);
+        let mut room = Ray::UNSET;
+        let (ray, unit) = with_ordinary_length(ray, &mut room);
         let found = |hit: Hit| found(Hit { t: hit.t * unit, ..hit });
-        dispatch!(self.level, simd => Crossings::new(self, ray, found).find(simd));
+        dispatch!(self.level, simd => Crossings::new(self, *ray, found).find(simd));
     }
 }

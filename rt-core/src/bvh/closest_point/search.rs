@@ -3,7 +3,6 @@
 use super::ClosestPoint;
 use super::triangle::nearest_of_triangle;
 use crate::bvh::Unit;
-use crate::bvh::blas::leaf_primitive_ids;
 use crate::bvh::entry::Entry;
 use crate::bvh::geometry::Geometry;
 use crate::bvh::instance_filter::InstanceFilter;
@@ -41,8 +40,8 @@ impl<'w> Search<'w> {
             None => {
                 let units = &world.tlas.units;
                 self.visit(units, self.point, 1.0, |search, leaf| {
-                    for &id in leaf_primitive_ids(units, leaf) {
-                        search.search_entry(world.entry(id));
+                    if let Some(entry) = world.entry_of_leaf(units, leaf, InstanceFilter::All) {
+                        search.search_entry(entry);
                     }
                 });
             }

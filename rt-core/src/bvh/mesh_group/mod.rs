@@ -124,7 +124,7 @@ impl MeshGroup {
 
 /// Members have no transforms. `None` cannot happen with finite bounds.
 fn place(frame: &LocalFrame, bounds: [Aabb; 2], origin: DVec3) -> Option<Placement> {
-    Placement::new(usize::MAX, &DAffine3::IDENTITY, frame, bounds, origin)
+    Placement::new(0, &DAffine3::IDENTITY, frame, bounds, origin)
 }
 
 /// Finds the member of a triangle: a table over ranges of triangle numbers, then a search among the

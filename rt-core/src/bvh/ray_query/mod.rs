@@ -108,11 +108,12 @@ impl<'a> RayQuery<'a> {
         if let Some(accept) = self.accept {
             return self.first_accepted(ray, accept, false);
         }
-        let (ray, unit) = with_ordinary_length(ray);
+        let mut room = Ray::UNSET;
+        let (ray, unit) = with_ordinary_length(ray, &mut room);
         let (world, filter) = (self.world, self.filter);
         let hit = dispatch!(world.level, simd => match world.robustness {
-            Robustness::Fast => world.closest_in::<_, FastTest>(simd, &ray, filter),
-            Robustness::Watertight => world.closest_in::<_, WatertightTest>(simd, &ray, filter),
+            Robustness::Fast => world.closest_in::<_, FastTest>(simd, ray, filter),
+            Robustness::Watertight => world.closest_in::<_, WatertightTest>(simd, ray, filter),
         });
         hit.map(|h| Hit { t: h.t * unit, ..h })
     }
@@ -125,11 +126,12 @@ impl<'a> RayQuery<'a> {
         if let Some(accept) = self.accept {
             return self.first_accepted(ray, accept, true).is_some();
         }
-        let (ray, _) = with_ordinary_length(ray);
+        let mut room = Ray::UNSET;
+        let (ray, _) = with_ordinary_length(ray, &mut room);
         let (world, filter) = (self.world, self.filter);
         dispatch!(world.level, simd => match world.robustness {
-            Robustness::Fast => world.occluded_in::<_, FastTest>(simd, &ray, filter),
-            Robustness::Watertight => world.occluded_in::<_, WatertightTest>(simd, &ray, filter),
+            Robustness::Fast => world.occluded_in::<_, FastTest>(simd, ray, filter),
+            Robustness::Watertight => world.occluded_in::<_, WatertightTest>(simd, ray, filter),
         })
     }
 
@@ -216,14 +218,15 @@ impl<'a> RayQuery<'a> {
 
     /// The closest hit that counts of a valid ray, or with `any` some hit that counts.
     fn first_accepted(&self, ray: &Ray, accept: Accept<'_>, any: bool) -> Option<Hit> {
-        let (ray, unit) = with_ordinary_length(ray);
+        let mut room = Ray::UNSET;
+        let (ray, unit) = with_ordinary_length(ray, &mut room);
         let (world, filter) = (self.world, self.filter);
         let hit = dispatch!(world.level, simd => match world.robustness {
             Robustness::Fast => {
-                AcceptedHits::<FastTest>::new(world, ray, unit, filter, accept, any).find(simd)
+                AcceptedHits::<FastTest>::new(world, *ray, unit, filter, accept, any).find(simd)
             }
             Robustness::Watertight => {
-                AcceptedHits::<WatertightTest>::new(world, ray, unit, filter, accept, any)
+                AcceptedHits::<WatertightTest>::new(world, *ray, unit, filter, accept, any)
                     .find(simd)
             }
         });

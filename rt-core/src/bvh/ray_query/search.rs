@@ -68,7 +68,8 @@ impl<'w, T: TriangleTest> AcceptedHits<'w, T> {
     fn search_entry<S: Simd>(&mut self, simd: S, entry: Entry<'_>, skip_t: &mut f32) {
         // One ulp past the best so far: a tie may go to this entry.
         let limit = self.best.map_or(self.ray.t_max, |b| b.t.next_up());
-        let (local, moved) = entry.placement().enter(&Ray { t_max: limit, ..self.ray });
+        let mut local = Ray::UNSET;
+        let moved = entry.placement().enter(&self.ray, limit, &mut local);
         if local.t_max > local.t_min {
             self.search_tree(simd, entry, &local, moved, skip_t);
         }
@@ -132,15 +133,10 @@ impl<S: Simd, T: TriangleTest> LeafTest<S> for AcceptedHits<'_, T> {
     type Query = ClosestHit;
 
     fn test(&mut self, simd: S, units: &[Unit], leaf: ChildRef, skip_t: &mut f32) -> bool {
-        for &id in leaf_primitive_ids(units, leaf) {
-            if self.world.allows(self.filter, id) {
-                self.search_entry(simd, self.world.entry(id), skip_t);
-                if self.any && self.best.is_some() {
-                    return true;
-                }
-            }
+        if let Some(entry) = self.world.entry_of_leaf(units, leaf, self.filter) {
+            self.search_entry(simd, entry, skip_t);
         }
-        false
+        self.any && self.best.is_some()
     }
 }
 
