@@ -14,7 +14,8 @@ use crate::ray::{HitBlock, LANES, RayBlock};
 use fearless_simd::Simd;
 use std::cell::Cell;
 
-// The ways through the upper level.
+/// Number of ways through the upper level.
+pub(super) const WAYS: usize = 3;
 
 /// Entry by entry, each with the rays of a packet that meet it: fast where many of them do.
 const BY_ENTRY: usize = 0;
@@ -24,7 +25,7 @@ const IN_BLOCKS: usize = 1;
 const BY_RAY: usize = 2;
 
 /// For closest hits and for occlusion.
-type Choices = [TimedChoice<3>; 2];
+type Choices = [TimedChoice<WAYS>; 2];
 
 thread_local! {
     /// The fastest way for coherent and for incoherent rays. Instances can be a few large ones, or
@@ -61,13 +62,28 @@ impl World {
                 }
                 return;
             }
-            BY_ENTRY => self.trace_by_entry::<S, T, Q>(simd, rays, hits, filter, scratch),
-            IN_BLOCKS => self.trace_blocks::<S, T, Q>(simd, rays, hits, filter),
-            _ => self.trace_single_rays::<S, T, Q>(simd, rays, hits, filter),
+            way => self.trace_in_way::<S, T, Q>(way, simd, rays, hits, filter, scratch),
         }
         let seconds = start.map_or(0.0, |start| start.elapsed().as_secs_f32());
         choice.learn(seconds / rays.len().max(1) as f32);
         CHOICES.set(choices);
+    }
+
+    /// At most sixteen blocks through the upper level in one of the ways; all give the same bits.
+    pub(super) fn trace_in_way<S: Simd, T: TriangleTest, Q: HitQuery>(
+        &self,
+        way: usize,
+        simd: S,
+        rays: &[RayBlock],
+        hits: &mut [HitBlock],
+        filter: InstanceFilter<'_>,
+        scratch: &mut TraversalScratch,
+    ) {
+        match way {
+            BY_ENTRY => self.trace_by_entry::<S, T, Q>(simd, rays, hits, filter, scratch),
+            IN_BLOCKS => self.trace_blocks::<S, T, Q>(simd, rays, hits, filter),
+            _ => self.trace_single_rays::<S, T, Q>(simd, rays, hits, filter),
+        }
     }
 
     /// Entry by entry, each with all rays of the packet that meet its box.

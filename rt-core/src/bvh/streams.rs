@@ -28,13 +28,19 @@ pub(super) struct TraversalScratch {
 }
 
 thread_local! {
-    static SCRATCH: RefCell<TraversalScratch> = RefCell::new(TraversalScratch {
-        outer: Packet::new(),
-        inner: Packet::new(),
-        local: Vec::new(),
-        moved: Vec::new(),
-        local_hits: Vec::new(),
-    });
+    static SCRATCH: RefCell<TraversalScratch> = RefCell::new(TraversalScratch::new());
+}
+
+impl TraversalScratch {
+    pub(super) fn new() -> Self {
+        TraversalScratch {
+            outer: Packet::new(),
+            inner: Packet::new(),
+            local: Vec::new(),
+            moved: Vec::new(),
+            local_hits: Vec::new(),
+        }
+    }
 }
 
 /// Slices of different lengths.

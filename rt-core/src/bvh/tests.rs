@@ -1,7 +1,8 @@
 //! The traversal against the brute-force reference, on every preset, instruction set and robustness
 //! mode.
 
-use super::query::WatertightTest;
+use super::query::{AnyHit, ClosestHit, FastTest, HitQuery, TriangleTest, WatertightTest};
+use super::streams::TraversalScratch;
 use super::*;
 use crate::mesh::TriMesh;
 use crate::ray::{HitBlock, LANES, NO_HIT, Ray, RayBlock};
@@ -295,6 +296,102 @@ fn rays_among_some_instances_meet_what_is_met_when_all_others_are_gone() {
                     );
                 }
             }
+        }
+    }
+}
+
+/// Tiles of pixels seen from `eye`, which is a point of every ray; with `apart`, the rays start at
+/// points of their own.
+fn tiles(eye: Vec3, apart: bool) -> Vec<RayBlock> {
+    let mut r = Random::new(7);
+    let towards = (-eye).normalize();
+    let right = towards.any_orthonormal_vector();
+    let up = right.cross(towards);
+    let mut pixel = |x: usize, y: usize| {
+        let at = |i: usize| i as f32 / 32.0 - 1.0 + 1.0 / 64.0;
+        let dir = (1.5 * right * at(x) + 1.5 * up * at(y) - eye) / eye.length().max(1.0);
+        let origin = if apart { eye + dir * 0.2 * r.unit() } else { eye };
+        let t_max = if r.unit() < 0.2 { eye.length() } else { f32::INFINITY };
+        Ray { origin, dir, t_min: if r.unit() < 0.2 { 0.3 } else { 0.0 }, t_max }
+    };
+    let order = (0..64 * 64).map(|i| (i / 1024, i / 256 % 4, i / 16 % 16, i % 16));
+    let places = order.map(|(row, tile, block, ray)| {
+        let of = |i: usize| (i % 4, i / 4);
+        let ((bx, by), (rx, ry)) = (of(block), of(ray));
+        (tile * 16 + bx * 4 + rx, row * 16 + by * 4 + ry)
+    });
+    let rays: Vec<Ray> = places.map(|(x, y)| pixel(x, y)).collect();
+    RayBlock::from_rays(&rays)
+}
+
+#[test]
+fn every_way_through_the_upper_level_gives_the_bits_of_single_rays() {
+    fn check<S: fearless_simd::Simd, T: TriangleTest, Q: HitQuery>(
+        simd: S,
+        world: &World,
+        blocks: &[RayBlock],
+        filter: InstanceFilter<'_>,
+        what: &str,
+    ) -> usize {
+        let mut scratch = TraversalScratch::new();
+        let mut met = 0;
+        for tile in blocks.chunks(LANES) {
+            let mut expected = vec![HitBlock::MISS; tile.len()];
+            world.trace_single_rays::<S, T, Q>(simd, tile, &mut expected, filter);
+            for way in 0..several_entries::WAYS {
+                let mut hits = vec![HitBlock::MISS; tile.len()];
+                world.trace_in_way::<S, T, Q>(way, simd, tile, &mut hits, filter, &mut scratch);
+                for (b, (found, expected)) in hits.iter().zip(&expected).enumerate() {
+                    for lane in 0..LANES {
+                        let (found, expected) = (found.get(lane), expected.get(lane));
+                        let ray = tile[b].get(lane);
+                        assert_eq!(found.is_some(), expected.is_some(), "{what}, {way}: {ray:?}");
+                        assert!(Q::ANY || found == expected, "{what}, {way}: {ray:?}");
+                        met += usize::from(found.is_some());
+                    }
+                }
+            }
+        }
+        met
+    }
+    // Instances, and meshes that share a tree.
+    for (n, unmoved) in [(2, 0), (7, 3), (60, 20), (400, 0)] {
+        let (geometries, mut instances) = many_places(n);
+        let mut geometries = geometries;
+        for k in 0..unmoved {
+            geometries.push(Geometry::Mesh(Arc::new(noise_soup(30, 100 + k as u64))));
+            let geometry = geometries.len() - 1;
+            instances.push(Instance { geometry, world_from_object: glam::DAffine3::IDENTITY });
+        }
+        let even: Vec<bool> = (0..instances.len()).map(|i| i % 2 == 0).collect();
+        for options in all_options() {
+            if options.quality != BuildQuality::Balanced {
+                continue;
+            }
+            let built = World::build(geometries.clone(), instances.clone(), &options);
+            let world = built.expect("sound geometries");
+            let mut met = 0;
+            // Near, and so far away that origins are moved.
+            for eye in [Vec3::new(0.4, 0.3, 2.0), Vec3::new(-3e3, 1e3, 2e3)] {
+                for apart in [false, true] {
+                    let blocks = tiles(eye, apart);
+                    for filter in [InstanceFilter::All, InstanceFilter::Marked(&even)] {
+                        let what = format!("{n} and {unmoved}, {options:?}, {eye}, {apart}");
+                        met += fearless_simd::dispatch!(world.level, simd => {
+                            let fast = options.robustness == Robustness::Fast;
+                            let (w, b) = (&world, &blocks[..]);
+                            if fast {
+                                check::<_, FastTest, ClosestHit>(simd, w, b, filter, &what)
+                                    + check::<_, FastTest, AnyHit>(simd, w, b, filter, &what)
+                            } else {
+                                check::<_, WatertightTest, ClosestHit>(simd, w, b, filter, &what)
+                                    + check::<_, WatertightTest, AnyHit>(simd, w, b, filter, &what)
+                            }
+                        });
+                    }
+                }
+            }
+            assert!(met > 3_000, "{n} and {unmoved}: {met} rays met something");
         }
     }
 }
