@@ -75,11 +75,12 @@ impl Sampler {
 
 /// Points for sixteen uses at once: the functions of [`Sampler`] in loops that the compiler
 /// vectorizes.
+#[repr(C, align(64))]
 pub(crate) struct SamplerBlock {
-    kind: Sampling,
     pixel: [u32; LANES],
     index: [u32; LANES],
     dimension: [u32; LANES],
+    kind: Sampling,
 }
 
 impl SamplerBlock {
@@ -158,6 +159,45 @@ impl SamplerBlock {
         )
     }
 
+    /// As [`SamplerBlock::cosine_hemispheres`] for `count` points in a row of each lane, the first
+    /// of which was [requested](SamplerBlock::set): calls `give(k, directions)` for each of them.
+    #[inline(never)]
+    pub(crate) fn cosine_hemispheres_in_a_row<S: Simd>(
+        &mut self,
+        simd: S,
+        count: u32,
+        mut give: impl FnMut(usize, [Row; 3]),
+    ) {
+        if self.kind != Sampling::Sobol {
+            for k in 0..count {
+                give(k as usize, self.cosine_hemispheres(simd));
+                self.index.iter_mut().for_each(|i| *i = i.wrapping_add(1));
+            }
+            return;
+        }
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                // What does not depend on the point is computed once.
+                let mut seeds = [[0; LANES]; 3];
+                for lane in 0..LANES {
+                    let s = sobol_seeds(self.pixel[lane], self.dimension[lane]);
+                    (seeds[0][lane], seeds[1][lane], seeds[2][lane]) = (s[0], s[1], s[2]);
+                }
+                for k in 0..count {
+                    let mut out = [[0.0; LANES]; 3];
+                    for lane in 0..LANES {
+                        let seeds = [seeds[0][lane], seeds[1][lane], seeds[2][lane]];
+                        let at = sobol_point_of(seeds, self.index[lane].wrapping_add(k));
+                        let d = cosine_hemisphere(at);
+                        (out[0][lane], out[1][lane], out[2][lane]) = (d.x, d.y, d.z);
+                    }
+                    give(k as usize, out);
+                }
+            },
+        );
+    }
+
     /// Directions by [`cosine_hemisphere`].
     #[inline(never)]
     pub(crate) fn cosine_hemispheres<S: Simd>(&self, simd: S) -> [Row; 3] {
@@ -184,12 +224,20 @@ fn pixel_key(seed: u64, x: u32, y: u32) -> u32 {
 
 #[inline(always)]
 fn sobol_point(pixel: u32, index: u32, dimension: u32) -> [f32; 2] {
+    sobol_point_of(sobol_seeds(pixel, dimension), index)
+}
+
+/// Seeds of the shuffle and of the two axes' scrambles.
+#[inline(always)]
+fn sobol_seeds(pixel: u32, dimension: u32) -> [u32; 3] {
     let seed = hash(pixel.wrapping_add(dimension.wrapping_mul(0x9e37_79b9)));
-    let i = owen_scramble(index, seed);
-    [
-        to_unit(owen_scramble(i.reverse_bits(), hash(seed ^ 0x68bc_21eb))),
-        to_unit(owen_scramble(sobol_second(i), hash(seed ^ 0x02e5_be93))),
-    ]
+    [seed, hash(seed ^ 0x68bc_21eb), hash(seed ^ 0x02e5_be93)]
+}
+
+#[inline(always)]
+fn sobol_point_of([shuffle, x, y]: [u32; 3], index: u32) -> [f32; 2] {
+    let i = owen_scramble(index, shuffle);
+    [to_unit(owen_scramble(i.reverse_bits(), x)), to_unit(owen_scramble(sobol_second(i), y))]
 }
 
 #[inline(always)]
@@ -325,6 +373,34 @@ mod tests {
                     let c =
                         Sampler::new(kind, 12 << 33, pixels.0[lane], pixels.1[lane], 3).square(1);
                     assert_eq!([camera[0][lane], camera[1][lane]], c);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn directions_in_a_row_are_those_of_single_points_at_every_level() {
+        use crate::simd::SimdLevel;
+        for level in SimdLevel::available().into_iter().map(Some).chain([None]) {
+            for kind in Sampling::ALL {
+                let one = |lane: u32| Sampler::new(kind, 5 << 34, 3 + lane, 91 * lane, lane % 3);
+                let mut block = SamplerBlock::new(kind);
+                for lane in 0..LANES as u32 {
+                    block.set(lane as usize, &one(lane), 4 + lane % 2, 0, 11);
+                }
+                let level = SimdLevel::resolve(level).expect("a level of this machine");
+                let mut given = Vec::new();
+                fearless_simd::dispatch!(level, simd => {
+                    block.cosine_hemispheres_in_a_row(simd, 11, |k, rows| given.push((k, rows)))
+                });
+                assert_eq!(given.len(), 11);
+                for (k, rows) in given {
+                    for lane in 0..LANES {
+                        let l = lane as u32;
+                        let p = one(l).square_of(4 + l % 2, k as u32, 11);
+                        let expected = cosine_hemisphere(p).to_array();
+                        assert_eq!(rows.map(|row| row[lane]), expected, "point {k} of lane {lane}");
+                    }
                 }
             }
         }

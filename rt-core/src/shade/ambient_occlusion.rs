@@ -4,8 +4,11 @@
 use super::frame_context::FrameContext;
 use super::lobes::ambient_albedo;
 use super::point::{Maps, WithMaps, WithoutMaps};
-use super::shadow::trace_light_rays;
-use super::wavefront::{LightRays, RayState};
+use super::point_block::{PointBlock, by_material};
+use super::response_block::{self, supports};
+use super::shadow::{trace_blocks, trace_light_rays};
+use super::sky_rays::{SkyRays, WIDE};
+use super::wavefront::{LightRays, OcclusionSource, RayState};
 use super::{Point, SampleDimension, TileArea};
 use crate::bvh::Coherence;
 use crate::effects::Effects;
@@ -15,9 +18,9 @@ use crate::math::orthonormal_basis;
 use crate::ray::{LANES, Ray};
 use crate::ray_stats::RayStats;
 use crate::sampler::{Sampler, SamplerBlock};
-use crate::simd::vectors::Row;
+use crate::simd::vectors::{Rows3, Vec3x16};
 use crate::surface::SurfacePoint;
-use fearless_simd::{Simd, dispatch};
+use fearless_simd::{Simd, SimdBase, SimdMask, dispatch, f32x16, mask32x16, u32x16};
 use glam::Vec3;
 
 /// Rays per batch: enough for the tracer to sort them by direction, few enough to stay in the
@@ -32,7 +35,7 @@ pub(crate) fn add_ambient_light(
     parameters: &[SurfaceParameters],
     states: &[RayState],
     rays: &mut LightRays,
-    OcclusionBuffers { open, hemisphere_samples }: &mut OcclusionBuffers,
+    OcclusionBuffers { open, hemisphere_samples, sky_rays }: &mut OcclusionBuffers,
     stats: &mut RayStats,
     mut cost: Option<&mut [f32]>,
 ) {
@@ -40,6 +43,7 @@ pub(crate) fn add_ambient_light(
     let ambient =
         if parameters.is_empty() { ambient_at::<WithoutMaps> } else { ambient_at::<WithMaps> };
     let ambient = |p: &Point| ambient(context, mean, parameters, p);
+    let in_blocks = parameters.is_empty();
     let occlusion = context
         .scene
         .ambient_occlusion
@@ -53,13 +57,23 @@ pub(crate) fn add_ambient_light(
 
     let count = occlusion.rays;
     let per_batch = (BATCH_RAYS / count as usize).max(1);
+    // Where an occluded ray is all there is to know, rays need no list of what they contribute.
+    let listed = context.light_passes_surfaces() || !matches!(rays.source, OcclusionSource::World);
     let mut start = 0;
     while start < points.len() {
         let end = (start + per_batch).min(points.len());
         // ---- Points that ambient light reaches.
         open.clear();
-        for (i, p) in points[start..end].iter().enumerate().filter(|(_, p)| p.lit) {
-            let light = ambient(p);
+        let mut light = Rows3::ZERO;
+        for (i, p) in points[start..end].iter().enumerate() {
+            if in_blocks && i % LANES == 0 {
+                let block = &points[start + i..end.min(start + i + LANES)];
+                dispatch!(context.level, simd => ambient_block(simd, context, mean, block, &mut light));
+            }
+            if !p.lit {
+                continue;
+            }
+            let light = if in_blocks { light.get(i % LANES) } else { ambient(p) };
             if light == Vec3::ZERO {
                 continue;
             }
@@ -76,29 +90,47 @@ pub(crate) fn add_ambient_light(
         // ---- Rays.
         rays.clear();
         rays.first_point = start as u32;
-        let mut sample = 0;
-        for o in open.iter() {
-            let first = rays.targets.len();
-            let p = &points[start + o.index as usize];
-            let over = Hemisphere::new(&p.surface);
-            for k in 0..count {
-                if let Some(ray) = over.ray(hemisphere_samples, sample, occlusion.distance) {
-                    rays.push(&ray, o.index, o.light, context.sky_number + k);
-                }
-                sample += 1;
-            }
-            let sent = rays.targets.len() - first;
-            for target in &mut rays.targets[first..] {
-                target.1 = o.light / sent as f32;
-            }
-            if let Some(cost) = cost.as_deref_mut() {
-                cost[states[p.lane as usize].slot as usize] += sent as f32;
+        let batch = &mut points[start..end];
+        let sent_by = |o: &OcclusionPoint| Hemisphere::new(&batch[o.index as usize].surface);
+        dispatch!(
+            context.level,
+            simd => sky_rays.fill(simd, open, sent_by, hemisphere_samples, count)
+        );
+        sky_rays.store_blocks(occlusion.distance as f32, &mut rays.blocks);
+        if let Some(cost) = cost.as_deref_mut() {
+            for (o, sent) in open.iter().zip(&sky_rays.sent) {
+                let p = &batch[o.index as usize];
+                cost[states[p.lane as usize].slot as usize] += *sent as f32;
             }
         }
-        let batch = &mut points[start..end];
-        let counts = trace_light_rays(context, rays, Coherence::Incoherent, |i, light| {
-            batch[i as usize].radiance += light
-        });
+        // ---- Light of those that arrive.
+        let counts = if listed {
+            for (o, (sent, numbers)) in open.iter().zip(sky_rays.numbers(count)) {
+                let radiance = o.light / sent as f32;
+                numbers.for_each(|k| rays.aim(o.index, radiance, context.sky_number + k));
+            }
+            trace_light_rays(context, rays, Coherence::Incoherent, |i, light| {
+                batch[i as usize].radiance += light
+            })
+        } else {
+            let mut counts = trace_blocks(context, rays, Coherence::Incoherent);
+            let mut first = 0;
+            for (open, sent) in open.chunks(LANES).zip(sky_rays.sent.chunks(LANES)) {
+                let mut arrived = [0; LANES];
+                for (lane, &sent) in sent.iter().enumerate() {
+                    let blocked = rays.count_blocked(first, sent as usize);
+                    arrived[lane] = sent - blocked;
+                    counts.blocked += blocked as u64;
+                    first += sent as usize;
+                }
+                dispatch!(
+                    context.level,
+                    simd => add_arrived(simd, open, sent, &arrived, batch)
+                );
+            }
+            counts.rays = first as u64;
+            counts
+        };
         stats.ambient_occlusion += counts.rays;
         stats.ambient_occlusion_blocked += counts.blocked;
         counts.add_to(stats);
@@ -121,9 +153,9 @@ fn ambient_at<M: Maps>(
 
 /// The hemisphere of a point's rays.
 pub(super) struct Hemisphere {
-    axes: [Vec3; 3],
-    origin: Vec3,
-    face_normal: Vec3,
+    pub(super) axes: [Vec3; 3],
+    pub(super) origin: Vec3,
+    pub(super) face_normal: Vec3,
 }
 
 impl Hemisphere {
@@ -138,32 +170,33 @@ impl Hemisphere {
         Hemisphere { axes: [x, y, normal], origin, face_normal: s.face_normal }
     }
 
-    /// The ray in direction `sample` of `hemisphere_samples`.
+    /// The ray in direction `sample` of `samples`.
     #[inline]
     pub(super) fn ray(
         &self,
-        hemisphere_samples: &[HemisphereSamples],
+        samples: &HemisphereSamples,
         sample: usize,
         distance: f64,
     ) -> Option<Ray> {
-        let [dx, dy, dz] = &hemisphere_samples[sample / LANES];
-        let lane = sample % LANES;
+        let [dx, dy, dz] = [samples.0[0][sample], samples.0[1][sample], samples.0[2][sample]];
         let [x, y, normal] = self.axes;
-        let dir = x * dx[lane] + y * dy[lane] + normal * dz[lane];
+        let dir = x * dx + y * dy + normal * dz;
         // The hemisphere of a smooth normal extends below the face, where no sky can be occluded.
         (dir.dot(self.face_normal) > 0.0)
             .then(|| Ray::new(self.origin, dir).with_t_max(distance as f32))
     }
 }
 
-/// Sixteen directions, one row per component.
-pub(super) type HemisphereSamples = [Row; 3];
+/// Directions over +z: a list for each component, with room for one more vector behind the last.
+#[derive(Default)]
+pub(super) struct HemisphereSamples(pub(super) [Vec<f32>; 3]);
 
 /// Buffers of one thread.
 #[derive(Default)]
 pub(crate) struct OcclusionBuffers {
     open: Vec<OcclusionPoint>,
-    hemisphere_samples: Vec<HemisphereSamples>,
+    hemisphere_samples: HemisphereSamples,
+    sky_rays: SkyRays,
 }
 
 /// A point that sends rays.
@@ -180,22 +213,95 @@ pub(super) fn directions<S: Simd>(
     context: &FrameContext<'_>,
     open: &[OcclusionPoint],
     count: u32,
-    out: &mut Vec<HemisphereSamples>,
+    HemisphereSamples(out): &mut HemisphereSamples,
 ) {
-    out.clear();
+    let len = open.len() * count as usize;
+    out.iter_mut().for_each(|out| out.resize(len + WIDE, 0.0));
     let mut block = SamplerBlock::new(context.options.sampling);
-    let mut lane = 0;
-    for o in open {
-        for k in 0..count {
-            block.set(lane, &o.sampler, o.dimension, k, count);
-            lane += 1;
-            if lane == LANES {
-                out.push(block.cosine_hemispheres(simd));
-                lane = 0;
-            }
+    for (b, open) in open.chunks(LANES).enumerate() {
+        for (lane, o) in open.iter().enumerate() {
+            block.set(lane, &o.sampler, o.dimension, 0, count);
         }
+        let first = b * LANES * count as usize;
+        block.cosine_hemispheres_in_a_row(simd, count, |k, rows| {
+            for (out, row) in out.iter_mut().zip(rows) {
+                let of_points = out[first + k..].iter_mut().step_by(count as usize);
+                of_points.zip(&row[..open.len()]).for_each(|(out, x)| *out = *x);
+            }
+        });
     }
-    if lane > 0 {
-        out.push(block.cosine_hemispheres(simd));
-    }
+}
+
+/// [`ambient_at`] for one to sixteen points without parameters of their own.
+#[inline(never)]
+fn ambient_block<S: Simd>(
+    simd: S,
+    context: &FrameContext<'_>,
+    mean: &IrradianceCoefficients,
+    points: &[Point],
+    out: &mut Rows3,
+) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let at = PointBlock::gather(points);
+            let color = Vec3x16::load(simd, &at.color);
+            let normal = Vec3x16::load(simd, &at.normal);
+            by_material(context, points, at.lit, |material, lanes| {
+                if supports(&material.model) {
+                    let light = response_block::ambient(
+                        simd,
+                        context.effects,
+                        &material.model,
+                        mean,
+                        color,
+                        normal,
+                    );
+                    let old = Vec3x16::load(simd, out);
+                    light.or_else(mask32x16::from_bitmask(simd, lanes as u64), old).store(out);
+                    return;
+                }
+                for lane in (0..LANES).filter(|l| lanes >> l & 1 != 0) {
+                    let albedo =
+                        ambient_albedo(&material.model, at.color.get(lane), context.effects);
+                    out.set(lane, albedo * mean.for_normal(at.normal.get(lane)));
+                }
+            });
+        },
+    );
+}
+
+/// Adds the light of the rays that arrived at one to sixteen points, each of which has `sent` rays.
+/// One sum a ray, as where rays have a list: the same bits.
+#[inline(never)]
+fn add_arrived<S: Simd>(
+    simd: S,
+    open: &[OcclusionPoint],
+    sent: &[u32],
+    arrived: &[u32; LANES],
+    points: &mut [Point],
+) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let (mut light, mut radiance) = (Rows3::ZERO, Rows3::ZERO);
+            let mut rays = [1.0; LANES];
+            for (lane, (o, &sent)) in open.iter().zip(sent).enumerate() {
+                light.set(lane, o.light);
+                radiance.set(lane, points[o.index as usize].radiance);
+                rays[lane] = sent as f32;
+            }
+            let each = Vec3x16::load(simd, &light).div(f32x16::from_slice(simd, &rays));
+            let mut sum = Vec3x16::load(simd, &radiance);
+            let arrived = u32x16::from_slice(simd, arrived);
+            for k in 0..sent.iter().copied().max().unwrap_or(0) {
+                let more = arrived.simd_gt(u32x16::splat(simd, k));
+                sum = sum.add(each).or_else(more, sum);
+            }
+            sum.store(&mut radiance);
+            for (lane, o) in open.iter().enumerate() {
+                points[o.index as usize].radiance = radiance.get(lane);
+            }
+        },
+    );
 }

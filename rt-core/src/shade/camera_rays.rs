@@ -171,18 +171,20 @@ impl CameraRays {
                     // Simple loops over scalars are vectorized by the compiler.
                     let (d0, dx, dy) = (self.dir[c], self.dir_x[c], self.dir_y[c]);
                     let (o0, ox, oy, start) = (self.origin[c], move_x[c], move_y[c], self.start);
+                    // Through local arrays, which no other array can overlap.
+                    let (mut from, mut to) = ([o0 as f32; LANES], [0.0; LANES]);
                     if self.parallel || start != 0.0 {
                         for l in 0..LANES {
                             let d = d0 + dx * x[l] + dy * y[l];
-                            dir[l] = d as f32;
-                            origin[l] = (o0 + (ox * x[l] + oy * y[l]) + d * start) as f32;
+                            to[l] = d as f32;
+                            from[l] = (o0 + (ox * x[l] + oy * y[l]) + d * start) as f32;
                         }
                     } else {
-                        *origin = [o0 as f32; LANES];
                         for l in 0..LANES {
-                            dir[l] = (d0 + dx * x[l] + dy * y[l]) as f32;
+                            to[l] = (d0 + dx * x[l] + dy * y[l]) as f32;
                         }
                     }
+                    (*origin, *dir) = (from, to);
                 }
                 out.t_min = [(near - self.start).max(0.0) as f32; LANES];
                 out.t_max = [(far - self.start) as f32; LANES];

@@ -1,5 +1,6 @@
 //! Direct light from the scene's lights, with or without shadow rays.
 
+use super::direct_block::{self, LightBlock, ShadowErrors};
 use super::frame_context::FrameContext;
 pub(super) use super::light_sampling::LightSampling;
 use super::lobes::response;
@@ -11,10 +12,11 @@ use crate::bvh::Coherence;
 use crate::light::{ResolvedLight, ResolvedLightKind, cone_share};
 use crate::material_maps::SurfaceParameters;
 use crate::math::{length, max_abs, orthonormal_basis};
-use crate::ray::Ray;
+use crate::ray::{LANES, Ray};
 use crate::ray_stats::RayStats;
 use crate::sampler::{Sampler, unit_disk};
 use crate::surface::SurfacePoint;
+use fearless_simd::dispatch;
 use glam::Vec3;
 
 /// Light that arrives at a point from one direction.
@@ -65,7 +67,7 @@ pub(crate) fn add_direct_light(
 }
 
 /// As [`add_direct_light`].
-fn direct_lighting<M: Maps>(
+pub(super) fn direct_lighting<M: Maps>(
     context: &FrameContext<'_>,
     area: &TileArea,
     points: &mut [Point],
@@ -77,8 +79,16 @@ fn direct_lighting<M: Maps>(
 ) {
     for (number, light) in context.lights.iter().enumerate() {
         rays.clear();
-        let LightSampling { traced, spread, count, first_number } = context.light_sampling[number];
-        for (i, p) in points.iter_mut().enumerate() {
+        let sampling = context.light_sampling[number];
+        let LightSampling { traced, spread, count, first_number } = sampling;
+        let in_blocks = !M::USED && !spread && direct_block::knows(light);
+        if in_blocks {
+            let mut block = LightBlock::new();
+            for (b, points) in points.chunks_mut(LANES).enumerate() {
+                light_block(context, light, sampling, b, points, states, &mut block, rays);
+            }
+        }
+        for (i, p) in points.iter_mut().enumerate().filter(|_| !in_blocks) {
             if !p.lit {
                 continue;
             }
@@ -136,6 +146,37 @@ fn direct_lighting<M: Maps>(
         stats.shadow_blocked += counts.blocked;
         counts.add_to(stats);
     }
+}
+
+/// The light of `light` at one to sixteen points, the `b`-th block of them.
+fn light_block(
+    context: &FrameContext<'_>,
+    light: &ResolvedLight,
+    LightSampling { traced, first_number, .. }: LightSampling,
+    b: usize,
+    points: &mut [Point],
+    states: &[RayState],
+    block: &mut LightBlock,
+    rays: &mut LightRays,
+) {
+    let from_light = traced.then(|| !context.light_passes_surfaces());
+    let errors = ShadowErrors { place_ulps: PLACE_ULPS, most_errors: MOST_ERRORS };
+    dispatch!(
+        context.level,
+        simd => block.fill(simd, context, light, points, from_light, errors)
+    );
+    let mut untested = if traced { 0 } else { block.lanes };
+    if traced && light.follows_camera_rays {
+        for (lane, p) in points.iter().enumerate() {
+            untested |= (states[p.lane as usize].first as u16) << lane;
+        }
+        untested &= block.lanes;
+    }
+    for lane in (0..points.len()).filter(|l| untested >> l & 1 != 0) {
+        points[lane].radiance += block.radiance.get(lane);
+    }
+    let first = (b * LANES) as u32;
+    rays.push_lanes(block.lanes & !untested, &block.rays, first, &block.radiance, first_number);
 }
 
 /// Direction and strength of `light` at `p`; `at` is a point of the unit square for lights with a

@@ -7,6 +7,7 @@ use crate::surface::SurfacePoint;
 use glam::Vec3;
 
 /// A surface point hit by a ray of the current wavefront.
+#[derive(Clone)]
 pub(crate) struct Point {
     pub(crate) surface: SurfacePoint,
     /// Unit, towards the origin of the ray.
@@ -47,6 +48,26 @@ impl Maps for WithoutMaps {
 }
 
 impl Point {
+    /// Nowhere yet.
+    pub(super) const BLANK: Point = Point {
+        surface: SurfacePoint {
+            point: Vec3::ZERO,
+            point_error: 0.0,
+            face_normal: Vec3::ZERO,
+            normal: Vec3::ZERO,
+            outside: false,
+            color: Vec3::ZERO,
+            opacity: 0.0,
+        },
+        view: Vec3::ZERO,
+        radiance: Vec3::ZERO,
+        t: 0.0,
+        lane: 0,
+        instance: 0,
+        lit: false,
+        parameters: NO_PARAMETERS,
+    };
+
     /// The surface parameters of this point, where they differ from the material.
     #[inline(always)]
     pub(super) fn parameters<'v, M: Maps>(

@@ -33,6 +33,20 @@ impl LightRayCounts {
     }
 }
 
+/// Finds which of the light rays in blocks are blocked, in frames where light does not pass
+/// surfaces.
+pub(crate) fn trace_blocks(
+    context: &FrameContext<'_>,
+    rays: &mut LightRays,
+    coherence: Coherence,
+) -> LightRayCounts {
+    rays.blocked.clear();
+    rays.blocked.resize(rays.blocks.len(), 0);
+    let world = &context.scene.world;
+    world.occluded_stream(&rays.blocks, &mut rays.blocked, coherence, InstanceFilter::All);
+    LightRayCounts::default()
+}
+
 /// Calls `arrived(point, radiance)` for the light that reaches the point of each light ray, in
 /// order.
 pub(crate) fn trace_light_rays(

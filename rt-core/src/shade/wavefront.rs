@@ -1,6 +1,7 @@
 //! Rays that are traced together, and their contributions to pixels.
 
 use crate::ray::{HitBlock, LANES, Ray, RayBlock};
+use crate::simd::vectors::Rows3;
 use glam::Vec3;
 
 /// What a ray is for.
@@ -43,12 +44,15 @@ pub(crate) struct Wavefront {
     /// One per ray, in lane order; blocks are filled without gaps except in the camera rays'
     /// wavefront.
     pub(crate) states: Vec<RayState>,
+    /// Some of the rays are of another kind than [`RayKind::Camera`].
+    pub(crate) has_scattered: bool,
 }
 
 impl Wavefront {
     pub(crate) fn clear(&mut self) {
         self.blocks.clear();
         self.states.clear();
+        self.has_scattered = false;
     }
 
     pub(crate) fn is_empty(&self) -> bool {
@@ -64,6 +68,7 @@ impl Wavefront {
         }
         let last = self.blocks.len() - 1;
         self.blocks[last].set(lane, ray);
+        self.has_scattered |= state.kind != RayKind::Camera;
         self.states.push(state);
     }
 
@@ -148,6 +153,40 @@ impl LightRays {
         self.targets.push((point, radiance));
     }
 
+    /// Says where the next ray goes whose block is in [`LightRays::blocks`] already; see
+    /// [`LightRays::push`].
+    #[inline]
+    pub(crate) fn aim(&mut self, point: u32, radiance: Vec3, number: u32) {
+        if !matches!(self.source, OcclusionSource::World) {
+            self.numbers.push(number);
+        }
+        self.targets.push((point, radiance));
+    }
+
+    /// Appends the rays of `lanes` in order, see [`LightRays::push`]; lane 0 is that of point
+    /// `first`.
+    #[inline]
+    pub(crate) fn push_lanes(
+        &mut self,
+        lanes: u16,
+        rays: &RayBlock,
+        first: u32,
+        radiance: &Rows3,
+        number: u32,
+    ) {
+        if lanes == u16::MAX && self.targets.len().is_multiple_of(LANES) {
+            self.blocks.push(*rays);
+            self.targets.extend((0..LANES).map(|l| (first + l as u32, radiance.get(l))));
+            if !matches!(self.source, OcclusionSource::World) {
+                self.numbers.extend([number; LANES]);
+            }
+            return;
+        }
+        for lane in (0..LANES).filter(|l| lanes >> l & 1 != 0) {
+            self.push(&rays.get(lane), first + lane as u32, radiance.get(lane), number);
+        }
+    }
+
     /// Point and number of each ray, unless the world is the source.
     pub(crate) fn numbered(&self) -> impl Iterator<Item = (u32, u32)> + '_ {
         self.targets.iter().map(|(point, _)| *point).zip(self.numbers.iter().copied())
@@ -161,6 +200,20 @@ impl LightRays {
             let ray = self.blocks[i / LANES].get(i % LANES);
             list.push(RecordedRay { ray, point: self.first_point + point, number, radiance });
         }
+    }
+
+    /// How many of the `count` rays from ray `first` on are blocked.
+    #[inline]
+    pub(crate) fn count_blocked(&self, first: usize, count: usize) -> u32 {
+        let (mut at, end, mut blocked) = (first, first + count, 0);
+        while at < end {
+            let (block, lane) = (at / LANES, at % LANES);
+            let taken = (LANES - lane).min(end - at);
+            let mask = (1u32 << taken) - 1;
+            blocked += (u32::from(self.blocked[block]) >> lane & mask).count_ones();
+            at += taken;
+        }
+        blocked
     }
 
     #[inline]

@@ -6,6 +6,7 @@
 //! on all lanes, with the same bits. Lanes that need f64 (tiny or huge triangles, normals that
 //! cannot be normalised) are left to `shading_point` itself.
 
+use super::point_block::ExactRows;
 use super::{HitPoint, ORDINARY_NORMAL_SQUARED, ResolvedInstance, ShadingPoint, Source, plane_of};
 use crate::material::{ColorSource, ColorTransfer, Sides};
 use crate::mesh::{Attribute, PerElement, TriMesh};
@@ -198,12 +199,23 @@ impl ResolvedInstance<'_> {
     ) -> u16 {
         simd.vectorize(
             #[inline(always)]
-            || self.mesh_block_body::<S, P>(simd, mesh, lanes, rays, hits, out),
+            || {
+                self.mesh_block_body::<S, P>(
+                    simd,
+                    mesh,
+                    lanes,
+                    rays,
+                    hits,
+                    out,
+                    &mut ExactRows::new(),
+                )
+            },
         )
     }
 
+    /// With [`HitPoint::EXACT`], fills `exact` too.
     #[inline(always)]
-    fn mesh_block_body<S: Simd, P: HitPoint>(
+    pub(super) fn mesh_block_body<S: Simd, P: HitPoint>(
         &self,
         simd: S,
         mesh: &TriMesh,
@@ -211,6 +223,7 @@ impl ResolvedInstance<'_> {
         rays: &RayBlock,
         hits: &HitBlock,
         out: &mut ShadingPointBlock,
+        exact: &mut ExactRows,
     ) -> u16 {
         let v = |x: f32| f32x16::splat(simd, x);
         // Lanes without a hit repeat one that has a hit, so the code below needs no checks.
@@ -240,9 +253,16 @@ impl ResolvedInstance<'_> {
         let squared = n.dot(n);
         let mut done = squared.simd_ge(v(ORDINARY_NORMAL_SQUARED.start))
             & squared.simd_lt(v(ORDINARY_NORMAL_SQUARED.end));
+        if P::EXACT {
+            done = self.exact_points(simd, [a, b, c], &hits.u, &hits.v, exact);
+        }
 
         // ---- Shading normal.
         let (outward, shading) = match self.shading_normals(mesh) {
+            None if P::EXACT => {
+                let unit = Vec3x16::load(simd, &exact.face_normal);
+                (unit, unit)
+            }
             None => {
                 let unit = n.scale(v(1.0) / squared.sqrt());
                 (unit, unit)
@@ -262,6 +282,7 @@ impl ResolvedInstance<'_> {
                 }
                 let (unit, ok) = s.try_normalize(simd);
                 done &= ok;
+                let n = if P::EXACT { Vec3x16::load(simd, &exact.face_normal) } else { n };
                 (n, unit)
             }
         };
@@ -281,9 +302,15 @@ impl ResolvedInstance<'_> {
             Sides::BackOnly => (back, !outside),
         };
         normal.store(&mut out.normal);
+        if P::EXACT {
+            outward.or_else(outside, outward.neg()).store(&mut exact.face_normal);
+            exact.outside = outside.to_bitmask() as u16;
+        }
 
         // ---- Point.
-        if P::COMPUTED {
+        if P::EXACT {
+            out.point = exact.point;
+        } else if P::COMPUTED {
             let inside = e1.scale(u).add(e2.scale(w2));
             let shift = Vec3x16::splat(simd, self.render_from_object.translation.as_vec3());
             let point = if self.normal_from_object.is_none() {

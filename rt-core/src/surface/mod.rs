@@ -9,8 +9,10 @@
 
 mod block;
 mod parameters;
+mod point_block;
 
 pub(crate) use block::{Planes, ShadingPointBlock};
+pub(crate) use point_block::SurfacePointBlock;
 
 use crate::bvh::Geometry;
 use crate::material::{ColorSource, Material, Sides};
@@ -79,6 +81,8 @@ pub(crate) struct ShadingPoint {
 /// Whether lights need the position of a [`ShadingPoint`].
 pub(crate) trait HitPoint {
     const COMPUTED: bool;
+    /// Whether rays will start there: point and face normal are then those of [`SurfacePoint`].
+    const EXACT: bool = false;
 }
 
 /// Some light depends on the position.
@@ -98,6 +102,9 @@ impl HitPoint for WithoutPoint {
 /// Squared lengths of face normals for which f32 suffices: outside this range, products of lengths
 /// may underflow or overflow.
 const ORDINARY_NORMAL_SQUARED: std::ops::Range<f32> = 1e-30..1e30;
+
+/// Error of a point, as a part of its largest coordinate.
+const POINT_ERROR: f32 = 4.0 * f32::EPSILON;
 
 impl SurfacePoint {
     /// Origin of a ray that leaves in direction `dir`, on the matching side of the surface.
@@ -329,17 +336,24 @@ impl<'a> ResolvedInstance<'a> {
     /// distant ones.
     #[inline(always)]
     fn point_and_normal(&self, corners: [Vec3; 3], hit: &Hit, ray: &Ray) -> (DVec3, Vec3) {
-        let [a, b, c] = corners.map(|p| p.as_dvec3());
-        let (e1, e2) = (b - a, c - a);
-        let local = a + e1 * hit.u as f64 + e2 * hit.v as f64;
-        let (point, n) = if self.normal_from_object.is_none() {
-            (local + self.render_from_object.translation, e1.cross(e2))
-        } else {
-            let m = &self.render_from_object;
-            (m.transform_point3(local), (m.matrix3 * e1).cross(m.matrix3 * e2) * self.winding)
-        };
+        let moved = self.normal_from_object.is_some();
+        let (point, n) = self.point_and_cross(corners, [hit.u, hit.v], moved);
         let length = n.length();
         (point, if length > 0.0 { (n / length).as_vec3() } else { -ray.dir.normalize_or_zero() })
+    }
+
+    /// Point and face normal of any length; `moved` when the transform is more than a translation.
+    #[inline(always)]
+    fn point_and_cross(&self, corners: [Vec3; 3], [u, v]: [f32; 2], moved: bool) -> (DVec3, DVec3) {
+        let [a, b, c] = corners.map(|p| p.as_dvec3());
+        let (e1, e2) = (b - a, c - a);
+        let local = a + e1 * u as f64 + e2 * v as f64;
+        if moved {
+            let m = &self.render_from_object;
+            (m.transform_point3(local), (m.matrix3 * e1).cross(m.matrix3 * e2) * self.winding)
+        } else {
+            (local + self.render_from_object.translation, e1.cross(e2))
+        }
     }
 
     fn shape_surface(&self, shape: &dyn Shape, ray: &Ray, hit: &Hit) -> SurfacePoint {
@@ -452,12 +466,11 @@ impl<'a> ResolvedInstance<'a> {
         alpha: f32,
     ) -> SurfacePoint {
         let point = point.as_vec3();
-        let ulps = 4.0 * f32::EPSILON;
-        let mut point_error = (ulps * coordinates + own_error) * self.stretch;
+        let mut point_error = (POINT_ERROR * coordinates + own_error) * self.stretch;
         if self.moved {
             // The ray was transformed to object space in f32: its error there is some ulp of its
             // coordinates.
-            point_error += ulps * max_abs(point);
+            point_error += POINT_ERROR * max_abs(point);
         }
         let (outside, normal, drawn) = self.turned(outward, shading, ray.dir);
         let face_normal = if outside { outward } else { -outward };

@@ -81,7 +81,7 @@ impl CameraHits {
 pub struct OcclusionScratch {
     rays: LightRays,
     open: Vec<OcclusionPoint>,
-    hemisphere_samples: Vec<HemisphereSamples>,
+    hemisphere_samples: HemisphereSamples,
     /// Rays traced so far.
     pub traced: u64,
 }

@@ -12,6 +12,7 @@ use super::direct::incident_from;
 use super::frame_context::FrameContext;
 use super::layers::record_block;
 use super::lobes::{ambient_albedo, response};
+use super::response_block::supports;
 use super::tile::{PIXELS, TileArea, TileLayers};
 use super::{OPAQUE, Workspace, generate_camera_rays, prefetch_surfaces};
 use crate::bvh::{Coherence, InstanceFilter};
@@ -136,7 +137,7 @@ fn light_hits<S: Simd, P: HitPoint>(
                         ),
                     );
                 }
-            } else if light::supports(&material.model) {
+            } else if supports(&material.model) {
                 light::radiance_block(
                     simd,
                     context,
@@ -211,4 +212,4 @@ fn radiance(
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

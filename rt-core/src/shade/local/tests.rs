@@ -42,7 +42,7 @@ fn towards_light(mut m: Material) -> Material {
 
 /// Every path through look-up and lighting, in pieces small enough for blocks to see several of
 /// them.
-fn mixed_scene() -> Scene {
+pub(in crate::shade) fn mixed_scene() -> Scene {
     let mut r = Random::new(11);
     let mut b = SceneBuilder::new();
     let map = |log| {
