@@ -1,8 +1,9 @@
 //! Surfaces, light and rays of sixteen points at a time have the bits of one point at a time, at
 //! every level.
 
-use super::ambient_occlusion::{Hemisphere, OcclusionBuffers, add_ambient_light};
+use super::ambient_occlusion::{OcclusionBuffers, add_ambient_light};
 use super::direct::direct_lighting;
+use super::hemisphere::Hemisphere;
 use super::local::tests::mixed_scene;
 use super::point::{Maps, Point, WithMaps, WithoutMaps};
 use super::wavefront::{LightRayResult, LightRays, OcclusionSource, RecordedRay};

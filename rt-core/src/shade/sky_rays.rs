@@ -1,12 +1,9 @@
 //! Ambient occlusion rays of many points, eight at a time: [`Hemisphere::ray`] with the same bits.
 
-use super::ambient_occlusion::{Hemisphere, HemisphereSamples, OcclusionPoint};
+use super::hemisphere::{Hemisphere, HemisphereSamples, OcclusionPoint, WIDE};
 use crate::ray::{LANES, RayBlock};
 use crate::simd::vectors::Row;
 use fearless_simd::{Simd, SimdBase, SimdMask, f32x8};
-
-/// Rays of one point that are made at once.
-pub(super) const WIDE: usize = 8;
 
 /// Rays in order of their points, each component in a list of its own.
 #[derive(Default)]

@@ -6,7 +6,6 @@
 //! on all lanes, with the same bits. Lanes that need f64 (tiny or huge triangles, normals that
 //! cannot be normalised) are left to `shading_point` itself.
 
-use super::point_block::ExactRows;
 use super::{HitPoint, ORDINARY_NORMAL_SQUARED, ResolvedInstance, ShadingPoint, Source, plane_of};
 use crate::material::{ColorSource, ColorTransfer, Sides};
 use crate::mesh::{Attribute, PerElement, TriMesh};
@@ -49,6 +48,28 @@ impl ShadingPointBlock {
         self.normal.set(lane, shading_point.normal);
         self.color.set(lane, shading_point.color);
         self.opacity[lane] = shading_point.opacity;
+    }
+}
+
+/// What a [`super::SurfacePoint`] has beyond a shading point.
+#[repr(C, align(64))]
+pub(super) struct ExactRows {
+    pub(super) point: Rows3,
+    /// Before orientation: unit normals that point outwards.
+    pub(super) face_normal: Rows3,
+    pub(super) point_error: Row,
+    /// Bit per lane.
+    pub(super) outside: u16,
+}
+
+impl ExactRows {
+    pub(super) fn new() -> ExactRows {
+        ExactRows {
+            point: Rows3::ZERO,
+            face_normal: Rows3::ZERO,
+            point_error: [0.0; LANES],
+            outside: 0,
+        }
     }
 }
 

@@ -4,7 +4,7 @@
 //! [`ResolvedInstance::surface`] computes them: the same bits. Lanes without a face normal or a
 //! shading normal are left to that function.
 
-use super::block::ShadingPointBlock;
+use super::block::{ExactRows, ShadingPointBlock};
 use super::{HitPoint, POINT_ERROR, ResolvedInstance, Source, SurfacePoint};
 use crate::mesh::TriMesh;
 use crate::ray::{HitBlock, LANES, RayBlock};
@@ -15,28 +15,6 @@ use fearless_simd::{Simd, SimdBase, f32x16, mask32x16};
 pub(crate) struct SurfacePointBlock {
     shading: ShadingPointBlock,
     exact: ExactRows,
-}
-
-/// What a [`SurfacePoint`] has beyond a shading point.
-#[repr(C, align(64))]
-pub(super) struct ExactRows {
-    pub(super) point: Rows3,
-    /// Before orientation: unit normals that point outwards.
-    pub(super) face_normal: Rows3,
-    point_error: Row,
-    /// Bit per lane.
-    pub(super) outside: u16,
-}
-
-impl ExactRows {
-    pub(super) fn new() -> ExactRows {
-        ExactRows {
-            point: Rows3::ZERO,
-            face_normal: Rows3::ZERO,
-            point_error: [0.0; LANES],
-            outside: 0,
-        }
-    }
 }
 
 /// Rays will start at the point.

@@ -1,7 +1,7 @@
 //! Traces the rays of a frame in its scene, or in a part of it: hits with their surfaces.
 
-use super::super::ambient_occlusion::{Hemisphere, HemisphereSamples, OcclusionPoint, directions};
 use super::super::direct::{LightSampling, incident_from, light_point, shadow_ray};
+use super::super::hemisphere::{Hemisphere, HemisphereSamples, OcclusionPoint, directions};
 use super::super::tile::{PIXELS, TileArea};
 use super::super::wavefront::{LightRays, OcclusionSource};
 use super::super::{SampleDimension, Workspace, generate_camera_rays, local, prefetch_surfaces};
