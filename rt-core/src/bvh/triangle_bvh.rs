@@ -12,6 +12,7 @@ use super::traverse::triangle_leaf::{AnyLeaf, ClosestLeaf, ClosestTri};
 use crate::math::Aabb;
 use crate::mesh::Triangles;
 use crate::ray::Ray;
+use crate::simd::huge_pages;
 use fearless_simd::Simd;
 use rayon::prelude::*;
 
@@ -36,14 +37,15 @@ impl TriBvh {
         let writer = TriWriter::new(mesh, frame, first);
         // Nearly always every triangle is usable: collect in place and remove the few others
         // afterwards.
-        let mut refs: Vec<PrimRef> = (0..mesh.indices.len() as u32)
+        let mut refs: Vec<PrimRef> = huge_pages::scratch(mesh.indices.len());
+        (0..mesh.indices.len() as u32)
             .into_par_iter()
             .with_min_len(1 << 14)
             .map(|i| {
                 let goes_on = progress.goes_on_at(i);
                 PrimRef::new(if goes_on { writer.bounds(i) } else { Aabb::EMPTY }, i)
             })
-            .collect();
+            .collect_into_vec(&mut refs);
         progress.check()?;
         refs.retain(|r| !r.is_empty());
         let skipped = mesh.indices.len() - refs.len();

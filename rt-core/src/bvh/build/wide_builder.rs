@@ -137,7 +137,7 @@ pub(crate) fn build_wide<W: LeafWriter>(
     progress.check()?;
     debug_assert_eq!(config.sah.leaves.size(), W::CAPACITY, "leaves that the writer can hold");
     let level = Level::new();
-    let mut spare = refs.clone();
+    let mut spare = huge_pages::scratch_copy(&refs);
     let plan = Plan { config, level, progress, counts: W::COUNTS };
     let root = collapse_cuts(fragments(&mut refs, &mut spare, &bounds, plan, 0)?);
     let (fallbacks, all) = root.fallbacks();
