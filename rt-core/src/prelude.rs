@@ -10,6 +10,7 @@
 //! ```
 
 pub use crate::bvh::{BuildOptions, Geometry, Instance, World};
+pub use crate::bvh::{HitF64, MeshF64, RayF64, WorldF64};
 pub use crate::mesh::{Attribute, TriMesh};
 pub use crate::ray::{Hit, HitBlock, Ray, RayBlock};
 pub use crate::shapes::Shape;

@@ -6,6 +6,7 @@ mod blas;
 mod brute_force;
 mod build;
 mod closest_point;
+mod double_precision;
 mod entry;
 mod entry_blocks;
 mod entry_packets;
@@ -31,6 +32,7 @@ mod world;
 
 pub use all_hits::{HitLists, TooManyHits};
 pub use closest_point::{ClosestPoint, NoDistance};
+pub use double_precision::{HitF64, MeshF64, RayF64, WorldF64};
 pub use error::BuildError;
 pub use geometry::{Geometry, Instance, SliceFacts};
 pub(crate) use instance_filter::InstanceFilter;

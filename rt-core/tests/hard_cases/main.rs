@@ -6,6 +6,8 @@ mod crossings;
 mod degenerate;
 mod directions;
 mod distances;
+mod double_precision;
+mod exact_oracle;
 mod leaks;
 mod limits;
 mod oracle;

@@ -8,7 +8,7 @@ use crate::ray::{LANES, RayBlock};
 use fearless_simd::{Simd, SimdBase, SimdFloat, SimdMask, f32x16};
 
 /// What the box tests of a block need, computed once.
-pub(super) struct BlockSetup<S: Simd> {
+pub(crate) struct BlockSetup<S: Simd> {
     origin: [f32x16<S>; 3],
     rcp: [f32x16<S>; 3],
     t_min: f32x16<S>,
@@ -30,10 +30,29 @@ impl<S: Simd> BlockSetup<S> {
         }
     }
 
+    /// The constants of rays that are set up already.
+    #[inline(always)]
+    pub(crate) fn of(simd: S, rays: [&RaySetup; LANES]) -> Self {
+        let mut rows = [[0.0; LANES]; 7];
+        for (lane, ray) in rays.into_iter().enumerate() {
+            for axis in 0..3 {
+                rows[axis][lane] = ray.origin[axis];
+                rows[3 + axis][lane] = ray.rcp[axis];
+            }
+            rows[6][lane] = ray.t_min;
+        }
+        BlockSetup {
+            origin: three!(|a| f32x16::from_slice(simd, &rows[a])),
+            rcp: three!(|a| f32x16::from_slice(simd, &rows[3 + a])),
+            t_min: f32x16::from_slice(simd, &rows[6]),
+            slack: f32x16::splat(simd, BOX_SLACK),
+        }
+    }
+
     /// Distances to the box of child `slot`, and the rays that enter it before `limit`. The rays
     /// differ in octant, so both planes of an axis are sorted per ray.
     #[inline(always)]
-    pub(super) fn enter(
+    pub(crate) fn enter(
         &self,
         simd: S,
         node: &[Unit; NODE_UNITS],

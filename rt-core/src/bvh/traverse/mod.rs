@@ -1,6 +1,6 @@
 //! Traversal of the 8-wide hierarchy.
 
-mod block_boxes;
+pub(crate) mod block_boxes;
 pub(crate) mod block_entries;
 mod hybrid;
 pub(crate) mod incoherent;
