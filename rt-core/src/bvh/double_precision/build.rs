@@ -5,6 +5,7 @@ use super::input::MeshF64;
 use crate::bvh::build::{PrimRef, UNWATCHED, build_wide};
 use crate::bvh::layout::wide::{ChildRef, LEAF_SIZE, LeafWriter, Unit, WideBvh};
 use crate::bvh::options::BuildQuality;
+use crate::simd::prefetch;
 use glam::DVec3;
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -63,6 +64,25 @@ impl Numbered {
         // The last mesh that starts at or before it: empty meshes start where the next one does.
         let mesh = self.first.partition_point(|&first| first <= number) - 1;
         (mesh as u32, number - self.first[mesh])
+    }
+
+    /// Requests a triangle's indices from memory.
+    #[inline(always)]
+    pub(super) fn prefetch_indices(&self, number: u32) {
+        let (mesh, prim) = self.place(number);
+        if let Some(mesh) = self.meshes.get(mesh as usize) {
+            prefetch::<1, _>(&mesh.indices, prim as usize);
+        }
+    }
+
+    /// Requests a triangle's corners from memory. Reads its indices.
+    #[inline(always)]
+    pub(super) fn prefetch_corners(&self, number: u32) {
+        let (mesh, prim) = self.place(number);
+        let Some(mesh) = self.meshes.get(mesh as usize) else { return };
+        for vertex in mesh.indices.get(prim as usize).into_iter().flatten() {
+            prefetch::<1, _>(&mesh.positions, *vertex as usize);
+        }
     }
 
     /// The corners of a triangle; `None` when it cannot be hit.

@@ -4,6 +4,7 @@ use super::crossing::ExactRay;
 use super::input::{HitF64, RayF64};
 use super::leaf::{AnyLeaf, ClosestLeaf, Search, TreeRay};
 use super::local_ray::{LocalRay, Start};
+use super::nearest::Nearest;
 use super::shared_start::{self, start_together};
 use super::world::WorldF64;
 use crate::bvh::layout::wide::ChildRef;
@@ -82,10 +83,23 @@ impl WorldF64 {
                         hits[i] = self.closest_of_everything(&rays[i]);
                     }
                     let new = |ray| ClosestLeaf::new(&self.triangles, ray);
+                    // The triangles are read when all of them are on their way from memory.
+                    let mut nearest = [Nearest::none(0.0); BATCH];
                     let done = |i: usize, leaf: ClosestLeaf<'_>| {
-                        hits[i] = self.hit(&rays[i], &leaf.nearest);
+                        if leaf.nearest.found {
+                            self.triangles.prefetch_indices(leaf.nearest.number);
+                            nearest[i & (BATCH - 1)] = leaf.nearest;
+                        }
                     };
                     trace(simd, &TreeView::all(&self.tree.bvh), &batch, new, done);
+                    for nearest in nearest.iter().filter(|n| n.found) {
+                        self.triangles.prefetch_corners(nearest.number);
+                    }
+                    for (i, (ray, nearest)) in rays.iter().zip(&nearest).enumerate() {
+                        if nearest.found {
+                            hits[i] = self.hit(ray, nearest);
+                        }
+                    }
                 }
             },
         );
