@@ -69,7 +69,7 @@ impl ExactHit {
 /// The hit of a ray's line with one triangle, edges and corners included.
 fn hit(ray: &RayF64, corners: [DVec3; 3]) -> Option<(BigInt, BigInt)> {
     let (o, d) = (vector(ray.origin), vector(ray.dir));
-    let [a, b, c] = corners.map(|p| vector(p));
+    let [a, b, c] = corners.map(vector);
     let (e1, e2, s) = (minus(&b, &a), minus(&c, &a), minus(&o, &a));
     // Möller and Trumbore, "Fast, Minimum Storage Ray/Triangle Intersection", 1997, equation 4:
     // a formula of its own, apart from the library's.

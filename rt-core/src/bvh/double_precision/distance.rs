@@ -88,7 +88,8 @@ fn refined(ray: &RayF64, [a, b, c]: [DVec3; 3]) -> Option<Point> {
     let xy = if m.x >= m.y { 0 } else { 1 };
     let k = if m[xy] >= m.z { xy } else { 2 };
     // Slivers: weights to eight digits at least.
-    if !(size[k] * U < 1e-9 * m[k]) || !ORDINARY.contains(&m[k]) {
+    let precise = size[k] * U < 1e-9 * m[k];
+    if !precise || !ORDINARY.contains(&m[k]) {
         return None;
     }
     let (i, j) = ((k + 1) % 3, (k + 2) % 3);

@@ -1,5 +1,5 @@
-//! Test of an f32 ray against the rounded triangles of two leaves, eight at a time: which are surely
-//! missed, which surely hit, and how far along.
+//! Test of an f32 ray against the rounded triangles of two leaves, eight at a time: which are
+//! surely missed, which surely hit, and how far along.
 //!
 //! The test is that of [`crate::bvh::intersect::watertight`], with bounds on the distance from the
 //! result for the f64 ray and the f64 triangles.
@@ -14,18 +14,18 @@ use fearless_simd::{Select, Simd, SimdBase, SimdMask, f32x8};
 ///
 /// Coordinates of corners are at most 1 and those of the start at most
 /// [`super::local_ray::MAX_START`], so differences are at most 2¼ and sheared ones at most 4½. In
-/// units of 2⁻²⁵: rounding of the corner 1, of the start 2, of the difference 4, for two axes; of the
-/// slope times the difference 2¼; of the product 4; of the last difference 8. Together 28¼.
+/// units of 2⁻²⁵: rounding of the corner 1, of the start 2, of the difference 4, for two axes; of
+/// the slope times the difference 2¼; of the product 4; of the last difference 8. Together 28¼.
 const SHEARED: f32 = 1.0 / (1 << 20) as f32;
 
 /// Bound on the error of an edge function, as a factor of the sum of the magnitudes of all sheared
-/// coordinates: [`SHEARED`] for the coordinates, and 0.28 · [`SHEARED`] for the rounding of products
-/// of coordinates of at most 4½.
+/// coordinates: [`SHEARED`] for the coordinates, and 0.28 · [`SHEARED`] for the rounding of
+/// products of coordinates of at most 4½.
 const EDGE: f32 = 1.5 * SHEARED;
 
-/// Largest error of a depth that is not due to the edge functions. In units of 2⁻²⁵: rounding of the
-/// coordinate along the main axis 7, of the weights and their products with at most 2¼ 27, of the
-/// slope 2¼ and of the product with it 4½. Together 40¾.
+/// Largest error of a depth that is not due to the edge functions. In units of 2⁻²⁵: rounding of
+/// the coordinate along the main axis 7, of the weights and their products with at most 2¼ 27, of
+/// the slope 2¼ and of the product with it 4½. Together 40¾.
 const DEPTH: f32 = 1.0 / (1 << 19) as f32;
 
 /// Lanes that are not surely missed.

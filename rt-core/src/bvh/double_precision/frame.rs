@@ -8,10 +8,10 @@ use glam::{DVec3, Vec3};
 /// Boxes are wider than the triangles by this much in local space, along each axis.
 ///
 /// It covers the rounding of rays: at a distance of the true hit, the point of the f32 ray differs
-/// from that of the f64 ray by the rounding of its origin, whose coordinates are below 2 (2⁻²⁴), and
-/// of its direction, whose largest component is below 2, over a distance of at most 2½
-/// (2½ · 2⁻²⁴). So the f32 ray enters every box whose triangle the f64 ray hits, and at a distance
-/// not beyond that hit. The rounding of the slab test itself is covered as for f32 worlds, by
+/// from that of the f64 ray by the rounding of its origin, whose coordinates are below 2 (2⁻²⁴),
+/// and of its direction, whose largest component is below 2, over a distance of at most 2½ (2½ ·
+/// 2⁻²⁴). So the f32 ray enters every box whose triangle the f64 ray hits, and at a distance not
+/// beyond that hit. The rounding of the slab test itself is covered as for f32 worlds, by
 /// [`crate::bvh::traverse::single::BOX_SLACK`].
 const MARGIN: f64 = 1.0 / (1 << 22) as f64;
 

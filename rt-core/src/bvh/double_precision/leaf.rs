@@ -27,7 +27,8 @@ pub(super) trait Search<S: Simd>: LeafTest<S> + Copy {
     fn is_over(&self) -> bool;
 }
 
-/// Lanes of the pair that hold triangles: leaves may be partly filled, and a leaf alone comes twice.
+/// Lanes of the pair that hold triangles: leaves may be partly filled, and a leaf alone comes
+/// twice.
 #[inline(always)]
 fn filled(first: ChildRef, second: Option<ChildRef>) -> u32 {
     let lanes = |leaf: ChildRef| (1u32 << leaf.count()) - 1;

@@ -18,8 +18,8 @@ const OUTER: f64 = 1.0 / (1 << 20) as f64;
 /// rest on it.
 pub(super) const MAX_START: f64 = 1.25;
 
-/// Limit of the exponents of the direction and of the ray's unit, so that nothing below overflows or
-/// underflows.
+/// Limit of the exponents of the direction and of the ray's unit, so that nothing below overflows
+/// or underflows.
 const MAX_EXPONENT: i32 = 900;
 
 /// How a ray is traced.
