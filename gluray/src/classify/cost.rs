@@ -43,13 +43,13 @@ pub(crate) struct DriverSpeed {
     pixel_ns: f64,
 }
 
-/// llvmpipe, measured: lit triangles of vertex arrays, from 2 thousand to 16 million in 1024 x 1024
-/// pixels.
-const SOFTWARE: DriverSpeed = DriverSpeed { draw_ns: 2_000.0, triangle_ns: 180.0, pixel_ns: 12.0 };
+/// llvmpipe, measured in 1024 x 1024 pixels: lit triangles of vertex arrays, from a thousand to 16
+/// million; for draws, geomview, which has a Begin and End for each triangle.
+const SOFTWARE: DriverSpeed = DriverSpeed { draw_ns: 400.0, triangle_ns: 200.0, pixel_ns: 10.0 };
 
 /// A processor of graphics. Not measured: a billion triangles and ten billion pixels a second are
 /// less than small ones have had for ten years, and their work costs the program no processor time.
-const HARDWARE: DriverSpeed = DriverSpeed { draw_ns: 2_000.0, triangle_ns: 1.0, pixel_ns: 0.1 };
+const HARDWARE: DriverSpeed = DriverSpeed { draw_ns: 400.0, triangle_ns: 1.0, pixel_ns: 0.1 };
 
 impl DriverSpeed {
     /// The costs of the driver with this name (`GL_RENDERER`).
@@ -75,11 +75,11 @@ impl Default for DriverSpeed {
 
 const SET_NS: f64 = 150_000.0;
 const DRAW_NS: f64 = 5_000.0;
-const TRIANGLE_NS: f64 = 8.0;
+const TRIANGLE_NS: f64 = 6.0;
 /// Fast builds; a refit takes a sixth, which is counted as so many fewer triangles.
 const BUILT_NS: f64 = 200.0;
 const SEARCHED_NS: f64 = 20.0;
-const COVERED_NS: f64 = 60.0;
+const COVERED_NS: f64 = 80.0;
 /// What a hit costs more with each doubling of the triangles beyond a thousand.
 const DOUBLING_NS: f64 = 3.0;
 const PRESENTED_NS: f64 = 12.0;

@@ -65,8 +65,10 @@ pub(crate) struct Router {
     at_begin: u64,
     mode: u32,
     speed: DriverSpeed,
-    /// What went to the driver in this frame, unlooked at.
+    /// What went to the driver in this frame, unlooked at, and the number of draw calls that the
+    /// report does not have yet.
     passed: DriverWork,
+    unreported: u64,
     /// What was traced in this frame: as work for rays, and as work for the driver.
     traced: RayWork,
     instead: DriverWork,
@@ -94,6 +96,7 @@ impl Router {
             mode: 0,
             speed: DriverSpeed::default(),
             passed: DriverWork::default(),
+            unreported: 0,
             traced: RayWork::default(),
             instead: DriverWork::default(),
             shares: UNKNOWN,
@@ -139,24 +142,26 @@ impl Router {
     /// The driver draws so many vertices.
     #[inline]
     pub(crate) fn pass(&mut self, mode: u32, vertices: u32) {
+        self.unreported += 1;
         self.passed.draws += 1.0;
         self.passed.triangles += f64::from(triangles_of(mode, vertices));
     }
 
-    /// The driver draws a display list.
+    /// The driver draws a display list, which was compiled with so many draws in it.
     pub(crate) fn pass_list(&mut self, draws: u32, triangles: u32) {
-        self.passed.draws += f64::from(draws);
+        self.unreported += u64::from(draws);
+        self.passed.draws += 1.0;
         self.passed.triangles += f64::from(triangles);
     }
 
     /// True when something went to the driver unlooked at since the last frame ended.
     pub(crate) fn has_passed(&self) -> bool {
-        self.passed.draws > 0.0
+        self.unreported > 0
     }
 
     /// The draws that went to the driver since this was asked last.
     pub(crate) fn take_passed_draws(&mut self) -> u64 {
-        std::mem::take(&mut self.passed.draws) as u64
+        std::mem::take(&mut self.unreported)
     }
 
     /// True when so many vertices are worth their rays and their structure, even if they are drawn
@@ -203,7 +208,7 @@ impl Router {
         frame: u64,
         viewport: impl FnOnce() -> [i32; 4],
     ) -> bool {
-        let passed = DriverWork { draws: 0.0, ..std::mem::take(&mut self.passed) };
+        let passed = std::mem::take(&mut self.passed);
         if passed.triangles == 0.0 {
             return false;
         }
@@ -213,7 +218,7 @@ impl Router {
             (self.shares, self.since) = (UNKNOWN, 0);
             self.patience = self.patience.saturating_mul(2);
         }
-        let (rays, driver) = self.promise(passed.triangles, 1.0);
+        let (rays, driver) = self.promise(passed.triangles, passed.draws);
         self.promises_less(frame, rays, driver)
     }
 
@@ -353,6 +358,17 @@ mod tests {
         assert_eq!((changes.len(), changes[0].frame, changes[0].to.as_str()), (1, 101, "rays"));
         (101..200).for_each(|n| frame(&mut r, n, 4_000_000, false));
         assert!(!r.is_drivers && r.take_changes().is_empty());
+    }
+
+    #[test]
+    fn a_call_for_each_triangle_costs_the_driver_more() {
+        let by_calls = |calls: u32| {
+            let mut r = router();
+            (0..calls).for_each(|_| r.pass(TRIANGLES, 3 * (240_000 / calls)));
+            assert_eq!(r.take_passed_draws(), u64::from(calls));
+            r.end_of_drivers(2, || WINDOW)
+        };
+        assert!(!by_calls(1) && by_calls(240_000));
     }
 
     #[test]

@@ -30,7 +30,7 @@ use row_share::RowShare;
 use socket_comm::SocketComm;
 use std::os::unix::net::UnixStream;
 use std::sync::atomic::Ordering::Relaxed;
-use std::sync::{Mutex, PoisonError, OnceLock};
+use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 /// The variable that lists the helpers' sockets, separated by `:`.

@@ -55,3 +55,48 @@ impl TileMask {
         self.marks.as_ref().is_none_or(|m| m[y * self.width + x])
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::capture::draw::{Attributes, Draw, Shading};
+    use crate::capture::geometry_cache::{BuildCounts, GeometryCache};
+    use crate::capture::primitives::{PrimitiveRun, QuadSplit};
+    use crate::enums::TRIANGLES;
+    use crate::state::current_attributes::CurrentAttributes;
+    use crate::state::snapshot::Snapshot;
+    use crate::trace::overrides::RayMaterial;
+    use std::sync::Arc;
+
+    const ONE: [f32; 16] = [1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.];
+
+    #[test]
+    fn tiles_between_two_far_parts_of_a_mesh_are_left_out() {
+        // Half of the triangles are in the lower left corner, the others in the upper right one.
+        let corner = |i: usize| {
+            let at = if i < 96 { -0.9 } else { 0.9 };
+            let [x, y] = [1, 2].map(|k| if i % 3 == k { 0.05 } else { 0.0 });
+            [at + x, at + y, 0.0]
+        };
+        let positions: Vec<[f32; 3]> = (0..192).map(corner).collect();
+        let run = PrimitiveRun { mode: TRIANGLES, count: 192, times: 1 };
+        let geometry = GeometryCache::default().of_runs(&positions, &[run], &QuadSplit::default());
+        assert_eq!(geometry.clusters().len(), 4);
+        let viewport = [0, 0, 160, 160];
+        let state = Snapshot { viewport, model_view: ONE, projection: ONE, ..Snapshot::default() };
+        let draw = Draw {
+            geometry,
+            attributes: Arc::new(Attributes::constant(&CurrentAttributes::default())),
+            state: Arc::new(state),
+            shading: Shading::Fixed,
+            clip_from_object: ONE,
+            calls: 1,
+            ray_material: RayMaterial::default(),
+        };
+        let p = Prepared::new(&draw, None, &mut BuildCounts::default()).expect("it is visible");
+        let mask = TileMask::new(&p, Rect { x: 0, y: 0, w: 160, h: 160 });
+        let kept: Vec<(usize, usize)> =
+            (0..100).map(|i| (i % 10, i / 10)).filter(|(x, y)| mask.has(*x, *y)).collect();
+        assert_eq!(kept, [(0, 0), (9, 9)]);
+    }
+}
