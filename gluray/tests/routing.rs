@@ -51,7 +51,7 @@ fn frames_of_few_triangles_are_the_drivers_to_the_bit() {
 #[test]
 fn many_triangles_go_to_rays_after_a_frame_and_few_come_back_after_some() {
     // The first heavy frame is the driver's, and so are all from the fourth light one on.
-    let Some(report) = agrees("turns", |n| n < 7 || n > 20) else { return };
+    let Some(report) = agrees("turns", |n| !(7..=20).contains(&n)) else { return };
     assert_eq!(sides(&report), [("rays", true), ("driver", false)], "{report:?}");
     assert!(report.traced_draws > 0 && report.passed_reasons[CHEAPER] > 0, "{report:?}");
     let (_, again) = draw("turns", Some(&[])).expect("it ran before");
