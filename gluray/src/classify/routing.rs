@@ -241,8 +241,9 @@ impl Router {
         self.instead.triangles += triangles as f64 * times;
     }
 
-    /// So many pixels were searched for surfaces, once for each draw. Rays found surfaces at `covered`; `presented` are brought
-    /// into the framebuffer, and structures of `built` triangles were made.
+    /// So many pixels were searched for surfaces, once for each draw. Rays found surfaces at
+    /// `covered`; `presented` are brought into the framebuffer, and structures of `built` triangles
+    /// were made.
     pub(crate) fn traced_set(
         &mut self,
         searched: u64,

@@ -47,7 +47,8 @@ pub(super) struct RunArgs {
     /// blending.
     #[arg(long, value_parser = ["all", "scene"])]
     trace: Option<String>,
-    /// In mode match, trace also the frames that the driver draws for less. The picture is the same.
+    /// In mode match, trace also the frames that the driver draws for less. The picture is the
+    /// same.
     #[arg(long)]
     always_trace: bool,
     /// Write the account of the run here, as JSON.
