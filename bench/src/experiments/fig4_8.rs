@@ -47,7 +47,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     context.report_step("ParaView starts")?;
     let mut session = Session::start(
         paraview,
-        Backend::Serial,
+        Backend::AlwaysRays,
         Some(&tools.gluray),
         &display,
         &dir.path().join("run"),

@@ -57,6 +57,11 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     );
     record.column("cpu_speedup", "", "the same of CPU time");
     record.column("load", "", "load of the machine when the program's frames had been measured");
+    record.notes.push(
+        "gluray gives each frame to the driver or to rays, whichever is cheaper, except one frame \
+         late: there all are rays'."
+            .into(),
+    );
     record.notes.push(format!(
         "Windows of {SIZE_PX} x {SIZE_PX} pixels on an X server without a screen. The programs \
          take turns, a group of frames each, where two of them fit \
@@ -218,6 +223,9 @@ fn per_frame(c: Cost, frames: u32) -> Cost {
     Cost { wall_secs: c.wall_secs / f64::from(frames), cpu_secs: c.cpu_secs / f64::from(frames) }
 }
 
+/// The reason in gluray's report for frames that the driver draws for less.
+const CHEAPER: &str = "a frame that costs the driver less than rays";
+
 /// Fails if the driver drew frames that gluray should have traced.
 fn check(
     program: Program,
@@ -231,7 +239,7 @@ fn check(
     let traced = report["traced_draws"].as_u64().unwrap_or(0);
     let faults = report["faults"].as_array().map_or(0, Vec::len);
     anyhow::ensure!(
-        traced > 0 && faults == 0,
+        (traced > 0 || report["passed_reasons"][CHEAPER].is_u64()) && faults == 0,
         "{}: {traced} draws traced, {faults} faults; `passed_reasons`: {}",
         program.name(),
         report["passed_reasons"]

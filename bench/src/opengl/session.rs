@@ -54,8 +54,11 @@ impl Tools {
 pub enum Backend {
     /// Mesa's llvmpipe.
     Llvmpipe,
-    /// gluray; each frame is shown before the next one begins.
+    /// gluray; each frame is shown before the next one begins, and goes to the driver or to rays,
+    /// whichever is cheaper.
     Serial,
+    /// The same, always by rays.
+    AlwaysRays,
     /// gluray with pipelined presentation: each frame is shown one frame late.
     Asynchronous,
     /// gluray with this number of processes.
@@ -68,6 +71,7 @@ impl Backend {
         match self {
             Backend::Llvmpipe => "llvmpipe",
             Backend::Serial => "gluray",
+            Backend::AlwaysRays => "gluray, always by rays",
             Backend::Asynchronous => "gluray, one frame late",
             Backend::Ranks(_) => "gluray, several processes",
         }
@@ -122,6 +126,9 @@ impl Session {
                 c.args(["--quiet", "run", "--mode", "match", "--report"]).arg(report);
                 if let Backend::Ranks(ranks) = backend {
                     c.args(["--ranks", &ranks.to_string()]);
+                }
+                if backend == Backend::AlwaysRays {
+                    c.arg("--always-trace");
                 }
                 let late = if backend == Backend::Asynchronous { "on" } else { "off" };
                 c.args(["--set", &format!("asynchronous={late}"), "--"]).arg(&executable);

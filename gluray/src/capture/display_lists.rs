@@ -5,10 +5,11 @@
 //! a list of the driver's. Where they alternate, the driver's list is closed and another one begun.
 //! A call of the list executes both in order, through the same methods that the program calls. So
 //! the state is that at the time of the call, nested lists work, and the driver gets a primitive
-//! only when it must draw it.
+//! only when it must draw it. In frames that are the driver's, it draws lists of its own (`whole`).
 
 pub(crate) mod names;
 mod recording;
+mod whole;
 
 pub(crate) use recording::ListRecording;
 
@@ -20,7 +21,9 @@ use crate::interpose::context::Context;
 use crate::state::current_attributes::CurrentAttributes;
 use crate::watched_calls;
 use std::collections::HashMap;
-use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, OnceLock};
+use whole::WholeList;
 
 /// A step of a list.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -63,6 +66,11 @@ pub(crate) struct DisplayList {
     materials: Vec<(u32, u32, [f32; 4])>,
     /// The driver's lists other than the one of the same name.
     segments: Vec<u32>,
+    /// The list as the driver alone would have it, once it was drawn so. `None` inside for lists
+    /// that cannot be.
+    whole: OnceLock<Option<WholeList>>,
+    /// It was executed in a frame of the driver's. What is called once is not worth compiling.
+    executed: AtomicBool,
 }
 
 /// The lists of a share group.
@@ -178,7 +186,9 @@ impl Context {
             self.end_batch();
         }
         self.capture.depth_of_lists += 1;
-        self.execute(&list);
+        if !self.call_whole(&list) {
+            self.execute(&list);
+        }
         if self.capture.depth_of_lists == 1
             && self.capture.recorder.quads
             && self.capture.immediate_target == ImmediateModeTarget::Outside
@@ -198,25 +208,11 @@ impl Context {
         self.capture.depth_of_lists += 1;
         for op in &list.ops {
             match *op {
-                ListOp::Begin(mode) | ListOp::BeginArrays(mode) => gl::begin(mode),
-                ListOp::End => gl::end(),
-                ListOp::Vertex(v) => gl::vertex4f(v[0], v[1], v[2], v[3]),
-                ListOp::Normal(v) => gl::normal3f(v[0], v[1], v[2]),
-                ListOp::Color(v) => gl::color4f(v[0], v[1], v[2], v[3]),
-                ListOp::Tex(v) => gl::tex_coord4f(v[0], v[1], v[2], v[3]),
-                ListOp::Material(at) => {
-                    let (face, what, v) = list.materials[at as usize];
-                    gl::materialfv(face, what, &v);
-                }
-                ListOp::Driver { list, .. } => gl::call_list(list),
                 ListOp::Call(name) => self.execute_in_driver_or_call(name),
                 ListOp::CallFromBase(name) => {
                     self.execute_in_driver_or_call(gl::word(LIST_BASE).wrapping_add(name))
                 }
-                ListOp::Rect(v) => gl::rectf(v[0], v[1], v[2], v[3]),
-                ListOp::EvalCoord(..) | ListOp::EvalPoint(..) | ListOp::EvalMesh(_) => {
-                    evaluate_in_driver(op)
-                }
+                _ => list.send(op),
             }
         }
         self.capture.depth_of_lists -= 1;
@@ -527,7 +523,8 @@ fn evaluate_in_driver(op: &ListOp) {
 }
 
 fn delete_segments(list: Option<Arc<DisplayList>>) {
-    for segment in list.iter().flat_map(|l| &l.segments) {
-        gl::delete_lists(*segment, 1);
+    for list in list.iter() {
+        let whole = list.whole.get().into_iter().flatten().flat_map(|w| &w.names);
+        list.segments.iter().chain(whole).for_each(|name| gl::delete_lists(*name, 1));
     }
 }

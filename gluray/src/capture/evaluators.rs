@@ -208,6 +208,9 @@ impl Context {
             }
             ImmediateModeTarget::Outside => {}
         }
+        if self.passes_draw(mode, 0) {
+            return false;
+        }
         let [i1, i2, j1, j2] = range.map(i64::from);
         if !matches!(mode, POINT | LINE | FILL)
             || i1 > i2

@@ -5,6 +5,7 @@ mod refit;
 
 use crate::capture::primitives::PrimitiveRun;
 use crate::capture::primitives::{QuadSplit, triangulate};
+use rayon::prelude::*;
 use rt_core::bvh::{BuildOptions, BuildQuality, World};
 use rt_core::glam::Vec3;
 use rt_core::math::Aabb;
@@ -21,6 +22,7 @@ pub(crate) struct Geometry {
     world: Mutex<Option<Arc<World>>>,
     best: OnceLock<Arc<World>>,
     bounds: OnceLock<Aabb>,
+    clusters: OnceLock<Vec<Aabb>>,
     /// The same triangles in an earlier frame, at their former positions.
     before: Weak<Geometry>,
 }
@@ -32,6 +34,8 @@ pub(crate) struct BuildCounts {
     pub(crate) built: u64,
     /// Refitted from the triangles' former positions.
     pub(crate) refitted: u64,
+    /// The triangles of those built; of those refitted a sixth, which is what they cost.
+    pub(crate) triangles: u64,
 }
 
 /// Positions as bytes, and back as vectors.
@@ -47,6 +51,7 @@ impl Geometry {
             world: Mutex::new(None),
             best: OnceLock::new(),
             bounds: OnceLock::new(),
+            clusters: OnceLock::new(),
             before,
         }
     }
@@ -56,6 +61,30 @@ impl Geometry {
         *self.bounds.get_or_init(|| self.mesh.bounds())
     }
 
+    /// Boxes of runs of triangles, which enclose all of them.
+    pub(crate) fn clusters(&self) -> &[Aabb] {
+        /// With more boxes, projecting them would cost what the rays do that they save.
+        const MOST: usize = 512;
+        const LEAST_IN_ONE: usize = 16;
+        let make = || -> Vec<Aabb> {
+            let mesh = &*self.mesh;
+            let each = mesh.num_triangles().div_ceil(MOST).max(LEAST_IN_ONE);
+            let of = |run: &[[u32; 3]]| {
+                let corners = run.iter().flatten().filter_map(|i| mesh.positions.get(*i as usize));
+                Aabb::from_points(corners.filter(|p| p.is_finite()))
+            };
+            mesh.indices.par_chunks(each).map(of).filter(|b| !b.is_empty()).collect()
+        };
+        // Nothing is locked while the pool works, for the reason that `world` gives.
+        match self.clusters.get() {
+            Some(known) => known,
+            None => {
+                let made = make();
+                self.clusters.get_or_init(|| made)
+            }
+        }
+    }
+
     /// The structure, built now if necessary. `None` when the mesh cannot be built.
     pub(crate) fn world(&self, made: &mut BuildCounts) -> Option<Arc<World>> {
         if let Some(best) = self.best.get() {
@@ -63,6 +92,7 @@ impl Geometry {
         }
         if crate::host::config::current().settings.quality == crate::host::config::Quality::Best {
             made.built += 1;
+            made.triangles += self.mesh.num_triangles() as u64;
             self.improve();
             return self.best.get().cloned();
         }
@@ -81,6 +111,8 @@ impl Geometry {
         if kept.is_none() {
             made.refitted += u64::from(refitted);
             made.built += u64::from(!refitted);
+            let triangles = self.mesh.num_triangles() as u64;
+            made.triangles += if refitted { triangles / 6 } else { triangles };
             *kept = world;
         }
         kept.clone()

@@ -28,6 +28,14 @@ impl Context {
     /// The fast path of `glBegin`.
     #[inline(always)]
     pub(crate) fn begin_fast(&mut self, mode: u32) -> FastPathResult {
+        if self.routing.is_drivers
+            && self.capture.immediate_target == ImmediateModeTarget::Outside
+            && self.attributes.stale == 0
+        {
+            self.routing.begin(mode);
+            self.capture.immediate_target = ImmediateModeTarget::Pass;
+            return FastPathResult::Driver;
+        }
         let ready = self.capture.immediate_target == ImmediateModeTarget::Outside
             && self.state.dirty & class::DRAWS == 0;
         if ready
@@ -74,6 +82,12 @@ impl Context {
             ImmediateModeTarget::Pass => return false,
             ImmediateModeTarget::Outside => {}
         }
+        if self.routing.is_drivers {
+            self.attributes.sync();
+            self.routing.begin(mode);
+            self.capture.immediate_target = ImmediateModeTarget::Pass;
+            return false;
+        }
         let classification = self.classify_draw();
         let filled = crate::capture::primitives::is_filled(mode);
         let fixed = self.state.snapshot.program == 0;
@@ -116,6 +130,11 @@ impl Context {
     /// The fast path of `glEnd`.
     #[inline(always)]
     pub(crate) fn end_fast(&mut self) -> FastPathResult {
+        if self.routing.is_drivers && self.capture.immediate_target == ImmediateModeTarget::Pass {
+            self.routing.end();
+            self.capture.immediate_target = ImmediateModeTarget::Outside;
+            return FastPathResult::Driver;
+        }
         if self.capture.immediate_target == ImmediateModeTarget::Trace
             && self.classifier.classification != Classification::TraceInOrder
         {
@@ -159,7 +178,10 @@ impl Context {
                 self.capture.recorder.vertex([v[0], v[1], v[2]], &self.attributes.current);
                 FastPathResult::Done
             }
-            ImmediateModeTarget::Pass => FastPathResult::Driver,
+            ImmediateModeTarget::Pass => {
+                self.routing.vertices += 1;
+                FastPathResult::Driver
+            }
             _ => FastPathResult::Slow,
         }
     }
@@ -194,7 +216,7 @@ impl Context {
     #[inline(always)]
     pub(crate) fn normal_fast(&mut self, v: [f32; 3]) -> FastPathResult {
         match self.capture.immediate_target {
-            ImmediateModeTarget::Outside => {
+            ImmediateModeTarget::Outside if !self.routing.is_drivers => {
                 self.attributes.current.normal = v;
                 self.capture.recorder.behind = true;
                 self.attributes.mark_stale(stale::NORMAL);
@@ -206,7 +228,7 @@ impl Context {
                 self.attributes.mark_stale(stale::NORMAL);
                 FastPathResult::Done
             }
-            ImmediateModeTarget::Pass => {
+            ImmediateModeTarget::Pass | ImmediateModeTarget::Outside => {
                 self.attributes.current.normal = v;
                 FastPathResult::Driver
             }
@@ -225,7 +247,7 @@ impl Context {
     #[inline(always)]
     pub(crate) fn color_fast(&mut self, v: [f32; 4]) -> FastPathResult {
         match self.capture.immediate_target {
-            ImmediateModeTarget::Outside => {
+            ImmediateModeTarget::Outside if !self.routing.is_drivers => {
                 self.attributes.current.color = v;
                 self.capture.recorder.behind = true;
                 self.attributes.mark_stale(stale::COLOR);
@@ -239,7 +261,7 @@ impl Context {
                 self.attributes.mark_stale(stale::COLOR);
                 FastPathResult::Done
             }
-            ImmediateModeTarget::Pass => {
+            ImmediateModeTarget::Pass | ImmediateModeTarget::Outside => {
                 self.attributes.current.color = v;
                 FastPathResult::Driver
             }
@@ -267,7 +289,7 @@ impl Context {
     #[inline(always)]
     pub(crate) fn tex_coord_fast(&mut self, v: [f32; 4]) -> FastPathResult {
         match self.capture.immediate_target {
-            ImmediateModeTarget::Outside => {
+            ImmediateModeTarget::Outside if !self.routing.is_drivers => {
                 self.attributes.current.tex = v;
                 self.capture.recorder.behind = true;
                 self.attributes.mark_stale(stale::TEX);
@@ -279,7 +301,7 @@ impl Context {
                 self.attributes.mark_stale(stale::TEX);
                 FastPathResult::Done
             }
-            ImmediateModeTarget::Pass => {
+            ImmediateModeTarget::Pass | ImmediateModeTarget::Outside => {
                 self.attributes.current.tex = v;
                 FastPathResult::Driver
             }

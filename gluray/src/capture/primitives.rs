@@ -64,6 +64,17 @@ impl QuadSplit {
     }
 }
 
+/// The number of triangles of a primitive.
+pub(crate) fn triangles_of(mode: u32, count: u32) -> u32 {
+    match mode {
+        TRIANGLES => count / 3,
+        QUADS => count / 4 * 2,
+        QUAD_STRIP => (count / 2).saturating_sub(1) * 2,
+        TRIANGLE_STRIP | TRIANGLE_FAN | POLYGON => count.saturating_sub(2),
+        _ => 0,
+    }
+}
+
 /// The triangles of a primitive whose vertices are numbered `first..first + count`. The vertex that
 /// gives the flat colour comes last. Incomplete primitives give nothing, as in OpenGL.
 pub(crate) fn triangulate(
@@ -146,6 +157,11 @@ mod tests {
 
     #[test]
     fn degenerate_strips_and_incomplete_primitives_give_nothing() {
+        for mode in LINES..=POLYGON {
+            for count in 0..20 {
+                assert_eq!(triangles(mode, count).len(), triangles_of(mode, count) as usize);
+            }
+        }
         for mode in TRIANGLES..=POLYGON {
             for count in 0..3 {
                 assert_eq!(

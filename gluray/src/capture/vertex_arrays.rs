@@ -352,6 +352,9 @@ impl Context {
         if self.capture.immediate_target == ImmediateModeTarget::Pass {
             return false;
         }
+        if self.passes_draw(mode, u32::try_from(call.count).unwrap_or(u32::MAX)) {
+            return false;
+        }
         let classification = self.classify_draw();
         self.errors.keep();
         let taken = match classification {

@@ -1,8 +1,11 @@
 //! Decides which draws are traced and which the driver draws: rules on the state, VTK's shader
-//! programs, and the probe that finds out whether an unknown vertex shader is an affine map.
+//! programs, the probe that finds out whether an unknown vertex shader is an affine map, and the
+//! prices of both sides where either makes the same picture.
 
 pub(crate) mod affine_probe;
+pub(crate) mod cost;
 pub mod reasons;
+pub(crate) mod routing;
 pub(crate) mod rules;
 pub(crate) mod vtk;
 

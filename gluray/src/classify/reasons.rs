@@ -54,6 +54,11 @@ const TABLE: &[(&str, &str)] = &[
         "a buffer texture",
         "what VTK has for each cell comes in colours of bytes or floats; this one does not",
     ),
+    (
+        "a frame that costs the driver less",
+        "in mode match both make the same picture, so each frame goes to whoever is cheaper; \
+         --always-trace traces it all the same",
+    ),
     ("lines", "lines and points are drawn by the driver and joined with the picture by depth"),
     ("points", "lines and points are drawn by the driver and joined with the picture by depth"),
     ("polygons drawn as lines", "a wireframe; show surfaces to have them traced"),

@@ -282,7 +282,11 @@ impl Context {
                 ray_material,
             };
             overrides::apply(&mut draw, &self.config.settings);
-            self.counters.count_traced(draw.calls, draw.geometry.mesh.num_triangles());
+            // VTK would peel at least two layers of both sides, and draws sums once.
+            let passes = if signature.peel == TranslucencyPass::Layers { 4.0 } else { 1.0 };
+            let triangles = draw.geometry.mesh.num_triangles();
+            self.counters.count_traced(draw.calls, triangles);
+            self.routing.trace(draw.calls, triangles, passes);
             match signature.peel {
                 TranslucencyPass::Weighted => self.classifier.programs.weighted.take(draw),
                 _ => self.classifier.programs.peeling.take(draw),

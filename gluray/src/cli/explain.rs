@@ -100,6 +100,18 @@ fn in_words(r: &Report) -> String {
             line(format!("                     → {text}"));
         }
     }
+    for c in &r.routes {
+        line(format!(
+            "        from frame {} on {}: {} triangles on {} pixels cost the driver {:.1} ms, and \
+             rays {:.1} (by the model of costs)",
+            c.frame,
+            if c.to == "rays" { "rays draw" } else { "the driver draws" },
+            c.triangles,
+            c.pixels,
+            c.driver_ms,
+            c.rays_ms
+        ));
+    }
     if r.traced_draws + r.passed_draws == 0 && r.mode == "off" {
         line("        tracing was off: calls went to the driver as they came, uncounted".into());
         line("                     → switch it on with --mode or on the panel".into());

@@ -47,6 +47,10 @@ pub(super) struct RunArgs {
     /// blending.
     #[arg(long, value_parser = ["all", "scene"])]
     trace: Option<String>,
+    /// In mode match, trace also the frames that the driver draws for less. The picture is the
+    /// same.
+    #[arg(long)]
+    always_trace: bool,
     /// Write the account of the run here, as JSON.
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
@@ -99,6 +103,9 @@ fn settings(args: &RunArgs) -> Result<Vec<(String, String)>, UsageError> {
         Some("off") => variables.push((variable_of("enabled"), "false".into())),
         Some(mode) => variables.push((variable_of("mode"), mode.into())),
         None => {}
+    }
+    if args.always_trace {
+        variables.push((variable_of("always_trace"), "true".into()));
     }
     variables.extend(args.trace.iter().map(|t| (variable_of("trace"), t.clone())));
     let mut objects: Vec<String> = std::env::var(OBJECTS).into_iter().collect();

@@ -30,7 +30,7 @@ use row_share::RowShare;
 use socket_comm::SocketComm;
 use std::os::unix::net::UnixStream;
 use std::sync::atomic::Ordering::Relaxed;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 /// The variable that lists the helpers' sockets, separated by `:`.
@@ -85,6 +85,13 @@ fn begin() -> State {
             State::Alone
         }
     }
+}
+
+/// True when the user has given this process helpers. Read once: the program may change its
+/// environment while we look.
+pub(crate) fn is_asked_for() -> bool {
+    static GIVEN: OnceLock<bool> = OnceLock::new();
+    *GIVEN.get_or_init(|| crate::host::folders::variable(SOCKETS).is_some())
 }
 
 /// Runs `f` on the first rank when there are helpers and an image of this size is worth a request.

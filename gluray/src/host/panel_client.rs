@@ -78,6 +78,13 @@ impl FrameTelemetry {
         }
     }
 
+    /// Somebody looks at what rays find: the panel, or the user in a file.
+    pub(crate) fn is_watched() -> bool {
+        let connected =
+            || LINK.try_lock().is_ok_and(|l| l.as_ref().is_some_and(Link::is_connected));
+        dump_file().is_some() || EXPORT.load(Relaxed) || connected()
+    }
+
     /// What went wrong since it was asked last.
     pub(crate) fn take_problem(&mut self) -> Option<String> {
         self.problem.take()

@@ -11,6 +11,24 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering::Relaxed};
 use std::time::{Duration, Instant};
 
+/// From a frame on, another side draws: in mode `match`, each frame goes to whoever is cheaper.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct RouteChange {
+    /// The first frame of the new side; 1 is the first of all.
+    pub frame: u64,
+    /// `rays` or `driver`.
+    pub to: String,
+    /// The triangles of the frame by which this was decided.
+    pub triangles: u64,
+    /// The pixels that they cover, measured or assumed.
+    pub pixels: u64,
+    /// What the frame costs the driver, milliseconds of processor time by the model of costs.
+    pub driver_ms: f64,
+    /// The same for rays.
+    pub rays_ms: f64,
+}
+
 /// The report of one process.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
@@ -33,6 +51,8 @@ pub struct Report {
     pub passed_draws: u64,
     /// The reasons for it, with counts.
     pub passed_reasons: BTreeMap<String, u64>,
+    /// From which frames on rays or the driver draw, as far as that is decided by costs.
+    pub routes: Vec<RouteChange>,
     /// How often pending draws were presented, and before which calls.
     pub flushes: BTreeMap<String, u64>,
     /// Rays sent.
@@ -106,6 +126,7 @@ impl Report {
                 None => self.ranks.push(r.clone()),
             }
         }
+        self.routes.extend(other.routes.iter().cloned());
         self.objects.extend(other.objects.iter().cloned());
         self.timeline.extend(other.timeline.iter().cloned());
     }

@@ -10,6 +10,7 @@
 use crate::calls::{self, class};
 use crate::capture::{Capture, ImmediateModeTarget};
 use crate::classify::Classifier;
+use crate::classify::routing::Router;
 use crate::host::config::Config;
 use crate::host::report::Counters;
 use crate::interpose::flush_reason::FlushReason;
@@ -44,6 +45,8 @@ pub(crate) struct Context {
     pub(crate) capture: Capture,
     pub(crate) shared: SharedObjects,
     pub(crate) classifier: Classifier,
+    /// Whether the driver or rays draw this frame.
+    pub(crate) routing: Router,
     pub(crate) presentation: Presentation,
     pub(crate) counters: Counters,
 }
@@ -214,6 +217,7 @@ impl Context {
     fn new(handle: usize, group: ShareGroup, seen_created: bool) -> Context {
         let config = crate::host::config::current();
         let bypassed = !config.settings.enabled;
+        let routing = Router::new(&config.settings);
         let mut capture = Capture::default();
         if bypassed {
             capture.immediate_target = ImmediateModeTarget::Pass;
@@ -232,6 +236,7 @@ impl Context {
             capture,
             shared: SharedObjects::new(group, seen_created),
             classifier: Classifier::default(),
+            routing,
             presentation: Presentation::default(),
             counters: Counters::default(),
         }

@@ -27,6 +27,9 @@ pub(crate) struct Frame {
     places: Vec<(u32, [i32; 4])>,
     /// The framebuffers with depths that the driver has drawn since they were cleared.
     drivers_depths: Vec<u32>,
+    /// The driver may have drawn depths anywhere, except into framebuffers that were cleared since.
+    depths_anywhere: bool,
+    cleared: Vec<u32>,
     /// The highest row that window viewports reached in the previous frame and in this one.
     tops: [i32; 2],
 }
@@ -79,6 +82,7 @@ impl Frame {
     // ---- Who drew the depths --------------------------------------------------------------------
     /// The driver draws depths into a framebuffer.
     pub(crate) fn driver_draws_depth(&mut self, framebuffer: u32) {
+        self.cleared.retain(|f| *f != framebuffer);
         if !self.drivers_depths.contains(&framebuffer) {
             self.drivers_depths.push(framebuffer);
         }
@@ -87,16 +91,26 @@ impl Frame {
     /// The depths of a framebuffer are cleared.
     pub(crate) fn depth_cleared(&mut self, framebuffer: u32) {
         self.drivers_depths.retain(|f| *f != framebuffer);
+        if self.depths_anywhere && !self.cleared.contains(&framebuffer) {
+            self.cleared.push(framebuffer);
+        }
+    }
+
+    /// The driver has drawn whole frames, into whatever framebuffers.
+    pub(crate) fn driver_drew_frames(&mut self) {
+        self.depths_anywhere = true;
+        self.cleared.clear();
     }
 
     /// True when the driver has drawn depths anywhere.
     pub(crate) fn has_drivers_depths(&self) -> bool {
-        !self.drivers_depths.is_empty()
+        self.depths_anywhere || !self.drivers_depths.is_empty()
     }
 
     /// True when the driver has drawn depths into this framebuffer.
     pub(crate) fn has_drivers_depths_in(&self, framebuffer: u32) -> bool {
         self.drivers_depths.contains(&framebuffer)
+            || self.depths_anywhere && !self.cleared.contains(&framebuffer)
     }
 
     // ---- What was traced ------------------------------------------------------------------------

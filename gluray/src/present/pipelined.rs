@@ -23,6 +23,8 @@ pub(crate) struct TracedFrame {
     /// The numbers of shadow rays and ambient occlusion rays.
     pub(crate) extra: [u64; 2],
     pub(crate) primary: u64,
+    /// The pixels of the draws' rectangles, summed over draws.
+    pub(crate) searched: u64,
     pub(crate) structures: BuildCounts,
     pub(crate) took: Duration,
     /// The draws, whose memory is reused.
@@ -33,15 +35,16 @@ pub(crate) struct TracedFrame {
 pub(crate) fn trace(draws: Vec<TexturedDraw>, settings: &Settings) -> TracedFrame {
     let start = Instant::now();
     let mut structures = BuildCounts::default();
-    let (layer, extra, primary) = {
+    let (layer, extra, primary, searched) = {
         let ready: Vec<Prepared<'_>> = draws
             .iter()
             .filter_map(|(d, image)| Prepared::new(d, image.clone(), &mut structures))
             .collect();
         let (layer, extra) = crate::cluster::nearest(&ready, settings);
-        (layer, extra, ready.iter().map(|p| p.rays.load(Relaxed)).sum())
+        let searched = ready.iter().map(|p| p.rect.w as u64 * p.rect.h as u64).sum();
+        (layer, extra, ready.iter().map(|p| p.rays.load(Relaxed)).sum(), searched)
     };
-    TracedFrame { layer, extra, primary, structures, took: start.elapsed(), draws }
+    TracedFrame { layer, extra, primary, searched, structures, took: start.elapsed(), draws }
 }
 
 /// The layers that are being traced, by their position in the frame.

@@ -19,6 +19,7 @@ mod screen_bounds;
 mod shading;
 pub(crate) mod texturing;
 pub(crate) mod thread_pool;
+mod tile_mask;
 mod tile_rays;
 mod translucent;
 pub(crate) mod view;

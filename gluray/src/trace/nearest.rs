@@ -2,6 +2,7 @@
 
 use super::fragment_batch::FragmentBatch;
 use super::fragments::{FragmentBlock, LaneState};
+use super::tile_mask::TileMask;
 use super::tile_rays::{BLOCKS, TileRays, slot};
 use super::{DEPTH_STEPS, Fragment, Layer, Prepared, Rect, TILE, UNCOVERED, to_bytes};
 use crate::cluster::row_share::RowShare;
@@ -66,6 +67,7 @@ pub(crate) fn nearest(
     if w * h == 0 {
         return (layer, [0; 2]);
     }
+    let masks: Vec<TileMask> = draws.par_iter().map(|p| TileMask::new(p, rect)).collect();
     let band = w * TILE as usize;
     let covered = AtomicU64::new(0);
     let bands = layer.color.par_chunks_mut(band).zip(layer.depth.par_chunks_mut(band)).enumerate();
@@ -77,10 +79,10 @@ pub(crate) fn nearest(
             let mut n = 0;
             let mut batch = FragmentBatch::default();
             // A tile's hits stay in the L1 cache until they are shaded.
-            for x in (rect.x..rect.x + rect.w).step_by(TILE as usize) {
+            for (column, x) in (rect.x..rect.x + rect.w).step_by(TILE as usize).enumerate() {
                 let tile = Rect { x, y, w: TILE.min(rect.x + rect.w - x), h: tile_h };
                 let mut any = false;
-                for (d, p) in draws.iter().enumerate() {
+                for (d, p) in draws.iter().enumerate().filter(|(d, _)| masks[*d].has(column, i)) {
                     any |= trace_draw(p, d as u32, tile, scratch, any);
                 }
                 if !any {

@@ -3,7 +3,9 @@
 
 use super::Rect;
 use crate::capture::draw::Draw;
+use crate::state::snapshot::Snapshot;
 use rt_core::glam::{DMat4, DVec3, DVec4};
+use rt_core::math::Aabb;
 
 /// The pixels that a draw may cover: its box on the screen, within viewport and scissor.
 pub(super) fn screen_bounds(draw: &Draw, clip: DMat4) -> Rect {
@@ -17,12 +19,18 @@ pub(super) fn screen_bounds(draw: &Draw, clip: DMat4) -> Rect {
     if b.is_empty() {
         return Rect::default();
     }
+    rect.and(box_on_screen(b, clip, s))
+}
+
+/// The pixels that a box may cover, beyond the viewport as well.
+pub(super) fn box_on_screen(b: Aabb, clip: DMat4, s: &Snapshot) -> Rect {
+    let [x, y, w, h] = s.viewport;
     let corners: [DVec4; 8] = std::array::from_fn(|corner| {
         let pick = |k: usize| if corner >> k & 1 == 0 { b.min[k] } else { b.max[k] };
         clip * DVec3::new(f64::from(pick(0)), f64::from(pick(1)), f64::from(pick(2))).extend(1.0)
     });
     if corners.iter().any(|c| !c.is_finite()) {
-        return rect;
+        return Rect { x, y, w, h };
     }
     match on_screen(&corners, s.depth_clamp) {
         None => Rect::default(),
@@ -34,7 +42,7 @@ pub(super) fn screen_bounds(draw: &Draw, clip: DMat4) -> Rect {
                 (pixel(lo[0], x, w).floor() as i32 - 1, pixel(lo[1], y, h).floor() as i32 - 1);
             let (x1, y1) =
                 (pixel(hi[0], x, w).ceil() as i32 + 1, pixel(hi[1], y, h).ceil() as i32 + 1);
-            rect.and(Rect { x: x0, y: y0, w: x1.saturating_sub(x0), h: y1.saturating_sub(y0) })
+            Rect { x: x0, y: y0, w: x1.saturating_sub(x0), h: y1.saturating_sub(y0) }
         }
     }
 }

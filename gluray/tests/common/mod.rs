@@ -115,6 +115,8 @@ impl Run<'_> {
             .env("GALLIUM_DRIVER", "llvmpipe")
             .env("PATH", "/usr/bin:/bin")
             .env("XDG_STATE_HOME", self.folder)
+            // Pictures of a few triangles are the driver's otherwise.
+            .env("GLURAY_ALWAYS_TRACE", "true")
             .env_remove("LD_LIBRARY_PATH");
         self.environment.iter().for_each(|(k, v)| {
             command.env(k, v);

@@ -69,13 +69,13 @@ mod tests {
             (hit, made)
         };
         let (_, first) = frame(0.0, false);
-        assert_eq!(first, BuildCounts { built: 1, refitted: 0 });
+        assert_eq!(first, BuildCounts { built: 1, refitted: 0, triangles: 7200 });
         let (moved, second) = frame(0.2, false);
-        assert_eq!(second, BuildCounts { built: 1, refitted: 1 });
+        assert_eq!(second, BuildCounts { built: 1, refitted: 1, triangles: 8400 });
         let (_, back) = frame(0.0, false);
         assert_eq!(back, second, "what was before kept its own tree");
         let (_, third) = frame(0.2, true);
-        assert_eq!(third, BuildCounts { built: 2, refitted: 1 });
+        assert_eq!(third, BuildCounts { built: 2, refitted: 1, triangles: 15_600 });
         let mut fresh = GeometryCache::default();
         let g = fresh.of_runs(&sheet(0.2, false), &runs, &QuadSplit::default());
         let world = g.world(&mut BuildCounts::default()).expect("a mesh that can be built");

@@ -42,6 +42,15 @@ fn dot(a: V3, b: V3) -> f32 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
+/// `v` to a power. Whole ones are products, exact to the last bit or two.
+fn raised(v: f32, power: f32) -> f32 {
+    const MOST: f32 = 1024.0;
+    match power.fract() == 0.0 && (1.0..=MOST).contains(&power) {
+        true => f64::from(v).powi(power as i32) as f32,
+        false => v.powf(power),
+    }
+}
+
 fn mix(a: V3, b: V3, t: f32) -> V3 {
     std::array::from_fn(|k| a[k] * (1.0 - t) + b[k] * t)
 }
@@ -187,13 +196,23 @@ impl VtkProgram {
         surface
     }
 
-    /// The position and normal of a fragment in eye space.
-    fn eye_point(&self, a: &Attributes, mesh: &TriMesh, at: &FragmentSample) -> (V3, V3) {
+    /// The position and normal of a fragment in eye space. Where nothing is `seen_from` there, the
+    /// position of a smooth surface is left out.
+    fn eye_point(
+        &self,
+        a: &Attributes,
+        mesh: &TriMesh,
+        at: &FragmentSample,
+        seen_from: bool,
+    ) -> (V3, V3) {
         let corners = mesh.indices[at.prim].map(|i| i as usize);
-        let view = corners.map(|i| {
-            let v = transform(&self.view_from_object, mesh.positions[i].to_array());
-            [v[0], v[1], v[2]]
-        });
+        let view = match seen_from || self.signature.flat {
+            true => corners.map(|i| {
+                let v = transform(&self.view_from_object, mesh.positions[i].to_array());
+                [v[0], v[1], v[2]]
+            }),
+            false => [[0.0; 3]; 3],
+        };
         let point = mixed(view, at.weights);
         let normal = if self.signature.flat {
             let e = |k: usize| -> V3 { std::array::from_fn(|c| view[k][c] - view[0][c]) };
@@ -230,7 +249,10 @@ impl VtkProgram {
         let out = if !self.signature.lit {
             std::array::from_fn(|k| s.ambient[k] + s.diffuse[k])
         } else {
-            let (point, normal) = self.eye_point(a, mesh, at);
+            let seen_from = self.physical.is_some()
+                || s.specular != [0.0; 3]
+                || self.lights.iter().any(|l| l.lamp.is_some());
+            let (point, normal) = self.eye_point(a, mesh, at, seen_from);
             match &self.physical {
                 Some(p) => self.physically_lit(p, &s, point, normal, reaches),
                 None => self.lit(&s, point, normal, reaches),
@@ -240,12 +262,15 @@ impl VtkProgram {
     }
 
     fn lit(&self, s: &Surface, point: V3, normal: V3, reaches: &Visibility) -> V3 {
+        // A power costs more than the rest of a light, and most surfaces have no highlights.
+        let shines = s.specular != [0.0; 3];
+        let highlight = |cosine: f32| if shines { raised(cosine, s.power) } else { 0.0 };
         let mut lit = [0.0; 3];
         let mut shine = [0.0; 3];
         if self.signature.headlight {
             let least = if self.signature.cosines_from_zero { 0.0 } else { 0.000_001 };
             let df = normal[2].max(least) * reaches.lights[0];
-            let sf = df.powf(s.power);
+            let sf = highlight(df);
             for k in 0..3 {
                 lit[k] = df * self.lights[0].color[k];
                 shine[k] = sf * self.lights[0].color[k];
@@ -265,7 +290,7 @@ impl VtkProgram {
             }
             // reflect(I, N) = I - 2 (N . I) N
             let r: V3 = std::array::from_fn(|k| direction[k] + 2.0 * cosine * normal[k]);
-            let sf = share * dot(r, to_eye).max(least).powf(s.power);
+            let sf = share * highlight(dot(r, to_eye).max(least));
             for k in 0..3 {
                 lit[k] += cosine * share * color[k];
                 shine[k] += sf * color[k];
@@ -327,6 +352,17 @@ mod tests {
         assert_eq!(light.reaching([3.0, 0.0, -2.0]).1, 0.0, "outside of the cone");
         let far = ProgramLight { lamp: None, ..light };
         assert_eq!(far.reaching([3.0, 0.0, -2.0]), ([0.0, 0.0, -1.0], 1.0));
+    }
+
+    #[test]
+    fn whole_powers_are_those_of_the_general_function() {
+        for power in [1.0, 2.0, 7.0, 30.0, 100.0, 128.0, 1024.0, 0.5, 30.5] {
+            for step in 0..=1000 {
+                let v = step as f32 / 1000.0;
+                let [ours, exact] = [f64::from(raised(v, power)), f64::from(v).powf(power.into())];
+                assert!((ours - exact).abs() <= 2e-7 * exact + 1e-37, "{v} to {power}: {ours}");
+            }
+        }
     }
 
     #[test]

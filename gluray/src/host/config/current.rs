@@ -40,6 +40,7 @@ pub(crate) const SUPPORTED_SETTINGS: &[&str] = &[
     "enabled",
     "mode",
     "trace",
+    "always_trace",
     "samples",
     "quality",
     "threads",

@@ -95,6 +95,12 @@ pub const FIELDS: &[Field] = &[
     ),
     field("trace", Kind::Word { words: &["scene", "all"] }, "which draws are traced"),
     field(
+        "always_trace",
+        Kind::Switch,
+        "rays also where the driver draws the same picture for less",
+    )
+    .only_in(&["match"]),
+    field(
         "samples",
         Kind::Whole { low: 1, high: 4096 },
         "rays through each pixel; mode path takes at least 16",

@@ -214,6 +214,8 @@ pub struct Settings {
     pub mode: Mode,
     /// Which draws are traced.
     pub trace: Trace,
+    /// In mode `match`: rays also where the driver draws the same picture for less.
+    pub always_trace: bool,
     /// Rays through each pixel.
     pub samples: u32,
     /// How acceleration structures are built.
@@ -240,6 +242,7 @@ impl Default for Settings {
             enabled: true,
             mode: Mode::default(),
             trace: Trace::default(),
+            always_trace: false,
             samples: 1,
             quality: Quality::default(),
             threads: 0,

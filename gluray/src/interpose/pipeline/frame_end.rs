@@ -14,6 +14,7 @@ use std::sync::Arc;
 impl Context {
     /// Ends a frame: its image is now visible on the screen.
     pub(crate) fn frame_done(&mut self) {
+        self.route_next_frame();
         self.counters.report.frames += 1;
         self.presentation.frame.frame_done();
         (self.counters.report.cache_hits, self.counters.report.cache_misses) =
@@ -48,6 +49,7 @@ impl Context {
                 self.end_bypass();
             }
             self.config = config;
+            self.route_by_settings();
             // Classifications depend on settings.
             self.state.dirty = class::ALL;
             watched_calls::arm();
@@ -57,7 +59,7 @@ impl Context {
     /// The program reads the framebuffer. This also ends a frame when something was traced for it.
     pub(super) fn read_back(&mut self) {
         self.presentation.frame.pipelined.read();
-        if self.presentation.frame.is_traced() {
+        if self.presentation.frame.is_traced() || self.routing.has_passed() {
             self.frame_done();
         }
     }
@@ -90,6 +92,15 @@ impl Context {
         if self.capture.immediate_target == ImmediateModeTarget::Trace {
             self.replay_to_driver("glClear between Begin and End");
             return false;
+        }
+        if self.routing.is_drivers {
+            let outside = self.capture.immediate_target == ImmediateModeTarget::Outside;
+            if mask & COLOR_AND_DEPTH == COLOR_AND_DEPTH && outside {
+                self.route_rest_of_frame();
+            }
+            if self.routing.is_drivers {
+                return false;
+            }
         }
         self.end_batch();
         self.classifier.programs.peeling.cleared(self.counters.report.passed_draws);

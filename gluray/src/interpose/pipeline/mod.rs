@@ -11,7 +11,7 @@
 //! 3. What is recorded becomes a draw ([`Context::end_batch`]), which waits for the others of its
 //!    frame ([`Context::add`]).
 //! 4. The pending draws are traced and presented (`presenting`).
-//! 5. A frame ends (`frame_end`).
+//! 5. A frame ends (`frame_end`), and it is decided who draws the next one (`routing`).
 //!
 //! The methods that take a draw from the program's calls stand in the room of their step, in
 //! `capture` and `classify`.
@@ -25,10 +25,12 @@
 
 mod frame_end;
 mod presenting;
+mod routing;
 
 use crate::calls::{self, class};
 use crate::capture::ImmediateModeTarget;
 use crate::capture::draw::{Draw, Values};
+use crate::classify::routing::CHEAPER;
 use crate::classify::rules::{self, Classification, TraceFilter};
 use crate::driver::gl;
 use crate::enums::*;
@@ -61,7 +63,9 @@ impl Context {
         if !self.counters.knows_driver() {
             // As large as the window until the program says otherwise.
             self.presentation.frame.set_initial_height(gl::ints(SCISSOR_BOX));
-            self.counters.set_driver(&gl::string(RENDERER), &gl::string(VERSION));
+            let renderer = gl::string(RENDERER);
+            self.routing.set_driver(&renderer);
+            self.counters.set_driver(&renderer, &gl::string(VERSION));
         }
         if self.capabilities.version == 0 && !self.bypassed {
             self.capabilities = self.errors.hiding(DriverCapabilities::query);
@@ -239,6 +243,9 @@ impl Context {
 
     /// What becomes of filled primitives that are drawn now.
     pub(crate) fn classify_draw(&mut self) -> Classification {
+        if self.routing.is_drivers {
+            return Classification::Pass(CHEAPER);
+        }
         self.refresh();
         self.attributes.set_since_draw = MaterialProperties::default();
         match self.classifier.classification {
@@ -275,7 +282,9 @@ impl Context {
 
     /// Adds a draw to the frame, or traces it at once when its order matters.
     pub(crate) fn add(&mut self, mut draw: Draw, in_order: bool) {
-        self.counters.count_traced(draw.calls, draw.geometry.mesh.num_triangles());
+        let triangles = draw.geometry.mesh.num_triangles();
+        self.counters.count_traced(draw.calls, triangles);
+        self.routing.trace(draw.calls, triangles, 1.0);
         if draw.geometry.mesh.indices.is_empty() {
             return;
         }
@@ -330,7 +339,10 @@ impl Context {
             self.replay_to_driver("a list between Begin and End");
         }
         self.end_batch();
-        if draws && self.capture.immediate_target == ImmediateModeTarget::Outside {
+        if draws
+            && self.capture.immediate_target == ImmediateModeTarget::Outside
+            && !self.routing.is_drivers
+        {
             self.refresh();
             if rules::commutes(&self.state.snapshot) {
                 self.presentation.frame.driver_drew();

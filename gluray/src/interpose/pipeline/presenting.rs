@@ -104,6 +104,9 @@ impl Context {
         self.counters.add_rays_of_modes([traced.primary, shadow, occlusion]);
         self.counters.count_builds(traced.structures);
         self.counters.report.pixels += traced.layer.covered as u64;
+        let (covered, presented) = (traced.layer.covered, traced.layer.depth.len());
+        let built = traced.structures.triangles;
+        self.routing.traced_set(traced.searched, covered, presented, built);
         let start = Instant::now();
         if traced.layer.covered > 0 {
             self.present(std::slice::from_ref(&traced.layer), composite_mode, sample);
@@ -117,6 +120,7 @@ impl Context {
     fn present_reused(&mut self, draws: Vec<TexturedDraw>, layer: Layer, func: u32) {
         self.counters.report.pictures_again += 1;
         self.counters.report.pixels += layer.covered as u64;
+        self.routing.traced_set(0, layer.covered, layer.depth.len(), 0);
         let start = Instant::now();
         if layer.covered > 0 {
             self.present(std::slice::from_ref(&layer), CompositeMode::Surface(func), None);
@@ -311,6 +315,8 @@ impl Context {
         self.counters.add_rays_of_modes(rays);
         self.counters.count_builds(structures);
         self.counters.report.pixels += layer.covered as u64;
+        let (hits, built) = (layer.covered, structures.triangles);
+        self.routing.traced_set(layer.depth.len() as u64, hits, layer.depth.len(), built);
         let start = Instant::now();
         if layer.covered > 0 {
             gl::draw_buffers(&target);
@@ -345,6 +351,9 @@ impl Context {
         self.counters.add_rays_of_modes(rays);
         self.counters.count_builds(structures);
         self.counters.report.pixels += sums.covered as u64;
+        // The depths of the window are read for it.
+        let pixels = width * height;
+        self.routing.traced_set(pixels as u64, sums.covered, pixels, structures.triangles);
         let start = Instant::now();
         if sums.covered > 0 {
             self.with_saved_state(|c| c.add_sums(&sums));

@@ -9,7 +9,7 @@ use crate::calls::at;
 use crate::capture::display_lists::names::width;
 use crate::capture::evaluators::MapKind;
 use crate::capture::immediate_mode::FastPathResult;
-use crate::driver::Int;
+use crate::driver::{Int, found};
 use crate::enums::{COLOR_INDEXES, SHININESS};
 use crate::faults::caught;
 use crate::interpose::client_memory::{self, ActiveCall, DrawArguments};
@@ -51,9 +51,19 @@ macro_rules! hot_hooks {
                     driver!($name($($a),*): ($($t),*));
                 }
             }
-            if current_context::fast_call(at::$name, |$c| $step) != FastPathResult::Done {
+            match current_context::fast_call(at::$name, |$c| $step) {
+                FastPathResult::Done => (),
+                FastPathResult::Driver => match found(at::$name) {
+                    // SAFETY: OpenGL's signature of this name, with the program's own arguments.
+                    Some(known) => unsafe {
+                        let f: unsafe extern "C" fn($($t),*) = core::mem::transmute(known);
+                        f($($a),*)
+                    },
+                    // SAFETY: the program's own arguments.
+                    None => unsafe { slow($($a),*) },
+                },
                 // SAFETY: the program's own arguments.
-                unsafe { slow($($a),*) }
+                FastPathResult::Slow => unsafe { slow($($a),*) },
             }
         }
     )* };
