@@ -32,6 +32,15 @@ pub struct RenderOptions {
     /// Renders only this part (its pixels equal those of the whole image, bit for bit). The frame
     /// has the size of the part.
     pub crop: Option<Crop>,
+    /// Points of the image plane, in normalized device coordinates (y upwards), that the pixels'
+    /// rays go through instead of their centres: one per pixel of the whole image, row by row from
+    /// the top. The image is then a list of samples of another image. 4 x 4 pixels are traced
+    /// together, so points should lie near each other there. Needs `samples` of 1.
+    pub points: Option<Arc<Vec<[f64; 2]>>>,
+    /// Points, as `points`, at which triangles are lit, as rasterizers light all samples of a pixel
+    /// at its centre: each where the ray through the point meets its plane, also beyond its sides.
+    /// Only frames without effects have it; in others surfaces are lit where they are hit.
+    pub shading_points: Option<Arc<Vec<[f64; 2]>>>,
     /// What to compute.
     pub layers: Layers,
     /// Effects that may run. `None`: those that scene and camera need. The report has a warning for
@@ -86,6 +95,8 @@ impl RenderOptions {
             width,
             height,
             crop: None,
+            points: None,
+            shading_points: None,
             layers: Layers::COLOR,
             effects: None,
             path_tracing: false,
@@ -151,6 +162,19 @@ impl RenderOptions {
             };
             if !inside(c.x, c.width, self.width) || !inside(c.y, c.height, self.height) {
                 return error("crop", format!("{c:?}"), "at least one pixel, inside the picture");
+            }
+        }
+        for points in [&self.points, &self.shading_points].into_iter().flatten() {
+            if points.len() != self.width as usize * self.height as usize {
+                let count = points.len().to_string();
+                return error("points", count, "as many as the image has pixels");
+            }
+            if self.samples != 1 {
+                let samples = self.samples.to_string();
+                return error("samples", samples, "1 where `points` are given");
+            }
+            if let Some(p) = points.iter().find(|p| !p.iter().all(|v| v.is_finite())) {
+                return error("points", format!("{p:?}"), "finite");
             }
         }
         if self.layers.is_empty() {

@@ -38,7 +38,19 @@ void RtvBlit::Release(vtkWindow* window)
   }
 }
 
-void RtvBlit::Upload(vtkRenderer* renderer, const RtvPicture& p)
+uint32_t rtvWindowSamples(vtkRenderer* renderer)
+{
+  auto window = vtkOpenGLRenderWindow::SafeDownCast(renderer->GetRenderWindow());
+  int samples = 0;
+  if (window)
+  {
+    // Of the framebuffer that is bound: passes and IceT draw into ones of their own.
+    window->GetState()->vtkglGetIntegerv(GL_SAMPLES, &samples);
+  }
+  return samples > 1 ? static_cast<uint32_t>(samples) : 0;
+}
+
+void RtvBlit::Upload(vtkRenderer* renderer, const RtvPicture& p, bool covered)
 {
   auto window = vtkOpenGLRenderWindow::SafeDownCast(renderer->GetRenderWindow());
   auto ready = [&](vtkSmartPointer<vtkTextureObject>& texture) {
@@ -60,6 +72,7 @@ void RtvBlit::Upload(vtkRenderer* renderer, const RtvPicture& p)
     this->Color = nullptr;
   }
   this->Blended = p.blended != nullptr;
+  this->Covered = covered && !this->Blended;
   this->Size[0] = static_cast<int>(p.width);
   this->Size[1] = static_cast<int>(p.height);
   if (this->Blended)
@@ -137,6 +150,11 @@ void RtvBlit::Draw(vtkRenderer* renderer, int x, int y, int width, int height, i
     {
       state->vtkglEnable(GL_BLEND);
       state->vtkglBlendFuncSeparate(GL_ONE, GL_ONE_MINUS_SRC_ALPHA, GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
+    }
+    else if (this->Covered)
+    {
+      state->vtkglEnable(GL_BLEND);
+      state->vtkglBlendFuncSeparate(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA, GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
     }
     else
     {

@@ -6,6 +6,7 @@
 // are drawn before its opaque props, the other pixels after them.
 #include "rtv_shim.h"
 
+#include <string>
 #include <vtkFrameBufferObjectBase.h>
 #include <vtkObjectFactory.h>
 #include <vtkOpenGLFXAAFilter.h>
@@ -65,6 +66,16 @@ int vtkRtvRenderer::UpdateGeometry(vtkFrameBufferObjectBase* fbo)
   {
     return this->Superclass::UpdateGeometry(fbo);
   }
+  if (this->Choice.OpenGLDraws(this->Bridge, this, this->PropArray, this->PropArrayCount))
+  {
+    for (int i = 0; i < this->PropArrayCount; ++i)
+    {
+      const std::string name = std::string(this->PropArray[i]->GetClassName()) + " " + std::to_string(i);
+      rtvApi->pass(this->Bridge, name.c_str(), nullptr);
+    }
+    rtvApi->end(this->Bridge);
+    return this->Superclass::UpdateGeometry(fbo);
+  }
   std::vector<vtkProp*> rest;
   for (int i = 0; i < this->PropArrayCount; ++i)
   {
@@ -86,6 +97,7 @@ int vtkRtvRenderer::UpdateGeometry(vtkFrameBufferObjectBase* fbo)
   }
   bool drawn = false;
   RtvPicture picture;
+  bool covered = false;
   if (traced > 0 && width > 0 && height > 0)
   {
     rtvAddLights(this->Bridge, this);
@@ -95,11 +107,13 @@ int vtkRtvRenderer::UpdateGeometry(vtkFrameBufferObjectBase* fbo)
     }
     RtvView view = rtvView(this, width, height);
     view.shadows = this->UseShadows ? 1 : 0;
+    view.window_samples = rtvWindowSamples(this);
+    covered = view.window_samples > 1;
     drawn = rtvApi->render(this->Bridge, &view, &picture) != 0;
   }
   if (drawn)
   {
-    this->Blit.Upload(this, picture);
+    this->Blit.Upload(this, picture, covered);
     this->PictureIsBlended = picture.blended != nullptr;
   }
   rtvApi->end(this->Bridge);

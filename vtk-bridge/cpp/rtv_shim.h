@@ -45,13 +45,27 @@ private:
 // Pass the lights of a renderer to the bridge, and return its camera.
 void rtvAddLights(RtvBridge* bridge, vtkRenderer* renderer);
 RtvView rtvView(vtkRenderer* renderer, int width, int height);
+// Samples of a pixel of the bound framebuffer; 0 for one without.
+uint32_t rtvWindowSamples(vtkRenderer* renderer);
+
+// Whether OpenGL draws these props of a renderer, because it is cheaper and the image the same.
+class RtvChoice
+{
+public:
+  bool OpenGLDraws(RtvBridge* bridge, vtkRenderer* renderer, vtkProp** props, int count);
+
+private:
+  // 1 if the driver works on the processor, 0 if not, -1 while that is not known.
+  int Software = -1;
+};
 
 // Draws an image with its depth into the bound framebuffer.
 class RtvBlit
 {
 public:
   ~RtvBlit();
-  void Upload(vtkRenderer* renderer, const RtvPicture& picture);
+  // With `covered`, the alpha of an opaque image is the part of a pixel that is covered.
+  void Upload(vtkRenderer* renderer, const RtvPicture& picture, bool covered);
   // Stage 0: opaque pixels, with depth. Stage 1: translucent pixels, tested against the existing
   // depth.
   void Draw(vtkRenderer* renderer, int x, int y, int width, int height, int stage);
@@ -61,6 +75,7 @@ private:
   vtkOpenGLQuadHelper* Quad = nullptr;
   vtkSmartPointer<vtkTextureObject> Color, Depth, FirstDepth;
   bool Blended = false;
+  bool Covered = false;
   int Size[2] = { 0, 0 };
 };
 
@@ -85,6 +100,7 @@ private:
 
   RtvBridge* Bridge = nullptr;
   RtvExtractor Extractor;
+  RtvChoice Choice;
   RtvBlit Blit;
   vtkSmartPointer<vtkRenderPass> Compositing;
   // Set while OpenGL draws the rest: the destination of the image.

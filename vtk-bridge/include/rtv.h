@@ -295,6 +295,10 @@ typedef struct RtvView {
   uint32_t interactive;
   /* 1 when the program itself asks for shadows. */
   uint32_t shadows;
+  /* Samples of each pixel of the framebuffer that the image is drawn into; 0 or 1 for none. With more, the alpha of opaque images is the part of the pixel that is covered. */
+  uint32_t window_samples;
+  /* Not used. */
+  uint32_t reserved;
 } RtvView;
 /* An image; rows start at the top, and the memory belongs to the bridge until its next call. */
 typedef struct RtvPicture {
@@ -302,7 +306,7 @@ typedef struct RtvPicture {
   uint32_t width;
   /* Rows. */
   uint32_t height;
-  /* RGBA bytes, or null when blended is not. */
+  /* RGBA bytes, not premultiplied, or null when blended is not. */
   uint8_t const* opaque;
   /* Premultiplied RGBA, or null. */
   float const* blended;
@@ -501,8 +505,37 @@ typedef struct RtvVolumeFacts {
   /* Scalars that RTV_BLEND_AVERAGE takes the mean of. */
   double average_range[2];
 } RtvVolumeFacts;
+/* Answers of rtv_choose: rays. */
+#define RTV_CHOICE_RAYS 0u
+/* OpenGL: nothing is added to the frame. */
+#define RTV_CHOICE_OPENGL 1u
+/* The caller has to collect the scene's facts and ask again. */
+#define RTV_CHOICE_ASK_AGAIN 2u
+/* A renderer's scene, for the choice between rays and OpenGL. The first three fields are always set, the others only when rtv_choose asks for them. */
+typedef struct RtvSceneFacts {
+  /* Pixels of the viewport. */
+  uint64_t pixels;
+  /* Props. */
+  uint32_t props;
+  /* 1 when the program itself asks for shadows. */
+  uint32_t shadows;
+  /* 1 when the fields below are set. */
+  uint32_t known;
+  /* 1 if OpenGL's driver works on the processor. */
+  uint32_t software;
+  /* 1 for the Python package. */
+  uint32_t python;
+  /* Visible volumes. */
+  uint32_t volumes;
+  /* Visible props with translucent surfaces. */
+  uint32_t translucent;
+  /* Visible props with edges. */
+  uint32_t edges;
+  /* Triangles of the visible props, in all copies. */
+  uint64_t triangles;
+} RtvSceneFacts;
 /* Version of this interface, computed from its structures and calls (a test gives the value). A shim built for another version must not continue. */
-#define RTV_ABI 827436969u
+#define RTV_ABI 67577348u
 /* All calls in one table, so that a shim needs only one symbol. */
 typedef struct RtvApi {
   /* rtv_abi. */
@@ -551,6 +584,8 @@ typedef struct RtvApi {
   char const* (*check_glyphs)(RtvBridge*, RtvGlyphFacts const*);
   /* rtv_check_volume. */
   char const* (*check_volume)(RtvBridge*, RtvVolumeFacts const*);
+  /* rtv_choose. */
+  uint32_t (*choose)(RtvBridge*, RtvSceneFacts const*);
 } RtvApi;
 
 /* RTV_ABI of the library. */
@@ -571,6 +606,8 @@ double rtv_bridge_option(RtvBridge* bridge, char const* name);
 void rtv_host(uint32_t vtk_major, uint32_t vtk_minor, uint32_t vtk_build);
 /* Begins a frame. Returns 0 if OpenGL should draw everything (RTV_OFF). */
 int32_t rtv_begin(RtvBridge* bridge);
+/* Says who draws this frame: one of RTV_CHOICE_*. Where the picture is the same either way and a model says that OpenGL is cheaper, it is OpenGL. Call it after rtv_begin, before anything is added; a caller that does not ask traces. */
+uint32_t rtv_choose(RtvBridge* bridge, RtvSceneFacts const* facts);
 /* Adds a surface: 1 if it will be traced, 0 if it has nothing to trace, -1 if its arrays are invalid. */
 int32_t rtv_surface(RtvBridge* bridge, RtvSurface const* surface);
 /* Adds all surfaces of one prop, or none of them, so that nothing is drawn twice. Returns how many will be traced, or -1 if the arrays of one are invalid (a warning names it). */
@@ -591,7 +628,7 @@ char const* rtv_check_surface(RtvBridge* bridge, RtvSurfaceFacts const* facts);
 char const* rtv_check_glyphs(RtvBridge* bridge, RtvGlyphFacts const* facts);
 /* As rtv_check_actor, for volumes. rtv_volume may give a reason too. */
 char const* rtv_check_volume(RtvBridge* bridge, RtvVolumeFacts const* facts);
-/* Records for the report that OpenGL draws something, and why. */
+/* Records for the report that OpenGL draws something, and why; null for the reason of rtv_choose. */
 void rtv_pass(RtvBridge* bridge, char const* name, char const* reason);
 /* Warns the user, once for each text. */
 void rtv_warn(RtvBridge* bridge, char const* message);

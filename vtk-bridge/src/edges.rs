@@ -207,27 +207,7 @@ pub(crate) fn draw(
     let veiled: Vec<bool> =
         first_depth.par_iter().zip(&frame.depth).map(|(first, own)| first < own).collect();
 
-    // ---- On the surface.
-    let width = view.width as usize;
-    let ids = frame.instance.par_iter().zip(&frame.primitive).with_min_len(CHUNK);
-    let seen = frame.color.par_iter_mut().zip(&mut frame.depth).zip(ids).enumerate();
-    seen.for_each(|(at, ((color, depth), (&instance, &primitive)))| {
-        let Some(Some(e)) = edges.get(instance as usize) else { return };
-        let Some(t) = e.project(primitive as usize, view) else { return };
-        let p = DVec2::new((at % width) as f64 + 0.5, (at / width) as f64 + 0.5);
-        let coverage = e.coverage(&t, &t.distances(p));
-        let alpha = color[3];
-        let line = match lit_lines.get(at) {
-            Some([r, g, b, _]) if e.lit => [*r, *g, *b],
-            _ => e.color.map(|c| c * alpha),
-        };
-        for (c, line) in color.iter_mut().zip(line) {
-            *c += (line - *c) * coverage;
-        }
-        if e.reach > 0.0 && *depth < 1.0 {
-            *depth = (t.depth(p) as f32).clamp(0.0, 1.0f32.next_down());
-        }
-    });
+    draw_inside(frame, lit_lines, edges, view, |at| at);
 
     // ---- Outside the surface.
     for e in edges.iter().flatten().filter(|e| e.reach > 0.0) {
@@ -247,6 +227,38 @@ pub(crate) fn draw(
             }
         }
     }
+}
+
+/// As [`draw`], on the surfaces only. `pixel_of` gives for each pixel of `frame` the one of the
+/// window at whose centre the distance from the edges counts.
+pub(crate) fn draw_inside(
+    frame: &mut Frame,
+    lit_lines: &[[f32; 4]],
+    edges: &[Option<Edges>],
+    view: &View,
+    pixel_of: impl Fn(usize) -> usize + Sync,
+) {
+    let width = view.width as usize;
+    let ids = frame.instance.par_iter().zip(&frame.primitive).with_min_len(CHUNK);
+    let seen = frame.color.par_iter_mut().zip(&mut frame.depth).zip(ids).enumerate();
+    seen.for_each(|(at, ((color, depth), (&instance, &primitive)))| {
+        let Some(Some(e)) = edges.get(instance as usize) else { return };
+        let Some(t) = e.project(primitive as usize, view) else { return };
+        let pixel = pixel_of(at);
+        let p = DVec2::new((pixel % width) as f64 + 0.5, (pixel / width) as f64 + 0.5);
+        let coverage = e.coverage(&t, &t.distances(p));
+        let alpha = color[3];
+        let line = match lit_lines.get(at) {
+            Some([r, g, b, _]) if e.lit => [*r, *g, *b],
+            _ => e.color.map(|c| c * alpha),
+        };
+        for (c, line) in color.iter_mut().zip(line) {
+            *c += (line - *c) * coverage;
+        }
+        if e.reach > 0.0 && *depth < 1.0 {
+            *depth = (t.depth(p) as f32).clamp(0.0, 1.0f32.next_down());
+        }
+    });
 }
 
 #[cfg(test)]
@@ -281,6 +293,7 @@ mod tests {
             interactive: false,
             shadows: false,
             samples: 0,
+            window_samples: 0,
             lens: None,
         };
         (edges, view)

@@ -490,6 +490,9 @@ pub struct View {
     pub shadows: bool,
     /// Samples per pixel that the program itself requests; 0 for no request.
     pub samples: u32,
+    /// Samples of each of the window's pixels (`vtkRenderWindow::SetMultiSamples`): edges are as
+    /// smooth as OpenGL would draw them. 0 or 1 for a window without; no more than 16 are taken.
+    pub window_samples: u32,
     /// The program's own lens.
     pub lens: Option<Lens>,
 }

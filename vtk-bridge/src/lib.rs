@@ -32,6 +32,7 @@
 //!     interactive: false,
 //!     shadows: false,
 //!     samples: 0,
+//!     window_samples: 0,
 //!     lens: None,
 //! };
 //! let image = bridge.render(&view)?;
@@ -49,6 +50,7 @@ pub mod anari;
 mod assemble;
 pub mod bridge;
 pub mod capi;
+pub mod choice;
 pub mod colors;
 mod edges;
 pub mod geometry;
@@ -61,3 +63,4 @@ pub mod report;
 pub mod setup;
 mod volumes;
 pub mod window_image;
+mod window_samples;

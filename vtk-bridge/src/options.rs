@@ -28,6 +28,8 @@ pub enum MaterialChoice {
 pub struct Options {
     /// Leaves all drawing to OpenGL.
     pub off: bool,
+    /// Rays draw whatever they can, also where OpenGL is cheaper and gives the same picture.
+    pub always_trace: bool,
     /// Threads; `None` for all.
     pub threads: Option<usize>,
     /// Samples per pixel.
@@ -89,6 +91,7 @@ impl Default for Options {
     fn default() -> Self {
         Options {
             off: false,
+            always_trace: false,
             threads: None,
             samples: 1,
             progressive: 1,
@@ -123,6 +126,7 @@ impl Default for Options {
 /// for misspelt names.
 pub const NAMES: &[(&str, &str, &str)] = &[
     ("RTV_OFF", "leave everything to OpenGL", "0 or 1"),
+    ("RTV_ALWAYS_TRACE", "trace also where OpenGL is cheaper and the picture the same", "0 or 1"),
     ("RTV_THREADS", "threads that trace", "1 to 1024; all by default"),
     ("RTV_SAMPLES", "samples per pixel", "1 to 65536"),
     ("RTV_PROGRESSIVE", "pictures averaged while nothing changes", "1 to 65536"),
@@ -233,9 +237,25 @@ impl Options {
         })
     }
 
+    /// Whether the picture cannot be OpenGL's: an effect, or shapes that OpenGL would draw
+    /// otherwise, or [`Options::always_trace`].
+    pub fn need_rays(&self) -> bool {
+        let effects = self.shadows
+            || self.ao > 0
+            || self.reflections
+            || self.mirror > 0.0
+            || self.path_tracing
+            || self.aperture > 0.0
+            || self.samples > 1
+            || self.progressive > 1
+            || self.material != MaterialChoice::Scene;
+        self.always_trace || effects || self.point_radius > 0.0 || self.line_radius > 0.0
+    }
+
     fn apply(&mut self, name: &str, value: &str) -> Option<()> {
         match name {
             "RTV_OFF" => self.off = switch(value)?,
+            "RTV_ALWAYS_TRACE" => self.always_trace = switch(value)?,
             "RTV_THREADS" => self.threads = Some(within(value, 1, 1024)?),
             "RTV_SAMPLES" => self.samples = within(value, 1, 65536)?,
             "RTV_PROGRESSIVE" => self.progressive = within(value, 1, 65536)?,

@@ -311,6 +311,7 @@ mod tests {
             interactive: false,
             shadows: false,
             samples: 0,
+            window_samples: 0,
             lens: None,
         };
         let mut depth = vec![1.0; 9];

@@ -4,12 +4,14 @@
 use crate::bridge::{BridgeError, RenderInputs, ms};
 use crate::input::View;
 use crate::materials::Encoding;
+use crate::window_samples::{SampleImage, divided_pixels, pattern};
 use rayon::prelude::*;
 use rt_core::effects::Effects;
 use rt_core::environment::Background;
 use rt_core::frame::{Frame, Layers};
 use rt_core::ray_stats::RayStats;
 use rt_core::render::{RenderOptions, Renderer};
+use std::sync::Arc;
 use std::time::Instant;
 
 /// An image; rows start at the top.
@@ -62,9 +64,11 @@ impl WindowImage {
         let soft_edges = inputs.options.samples > 1 || effects.contains(Effects::DEPTH_OF_FIELD);
         let see_through = Effects::TRANSPARENCY | Effects::VOLUMES;
         let blend = effects.intersects(see_through) || soft_edges || inputs.averaged;
+        let pattern = pattern(view.window_samples).filter(|_| !soft_edges);
         let layers = Layers::COLOR | Layers::DEPTH;
+        let with_ids = mixed || !inputs.edges.is_empty() || pattern.is_some();
         let options = RenderOptions {
-            layers: if mixed || !inputs.edges.is_empty() { layers | Layers::IDS } else { layers },
+            layers: if with_ids { layers | Layers::IDS } else { layers },
             // Interpolating an opacity of 1 gives slightly less than 1, so an alpha that rounds to
             // 255 of 255 is opaque.
             depth_min_opacity: if effects.contains(Effects::TRANSPARENCY) {
@@ -74,39 +78,58 @@ impl WindowImage {
             },
             ..inputs.options.clone()
         };
-        let output = renderer.render(inputs.scene, inputs.camera, &options)?;
-        let mut frame = output.frame;
-        let opaque_background = !matches!(inputs.scene.background, Background::Transparent);
-        let mut lit_lines = match inputs.lines {
-            Some(lines) => {
-                let wanted = if mixed { Layers::COLOR | Layers::IDS } else { Layers::COLOR };
-                let options = RenderOptions { layers: wanted, ..options.clone() };
-                renderer.render(lines, inputs.camera, &options)?.frame
-            }
-            None => Frame::default(),
-        };
-        let mut first_depth = if effects.contains(Effects::TRANSPARENCY) || opaque_background {
-            let depth_only =
-                RenderOptions { layers: Layers::DEPTH, samples: 1, ..inputs.options.clone() };
-            renderer.render(inputs.scene, inputs.camera, &depth_only)?.frame.depth
-        } else {
-            Vec::new()
-        };
+        let traced = Traced::new(renderer, inputs, &options, mixed)?;
+        let Traced { mut frame, lit_lines, mut first_depth, mut rays, warnings } = traced;
         if effects.contains(Effects::VOLUMES) {
             if first_depth.is_empty() {
                 first_depth.clone_from(&frame.depth);
             }
             crate::volumes::place_in_depth(&inputs.scene.volumes, view, &mut first_depth);
         }
-        let trace_ms = ms(start);
+        let mut trace_ms = ms(start);
 
         let start = Instant::now();
+        let opaque_background = !matches!(inputs.scene.background, Background::Transparent);
         if opaque_background {
             clear_background(&mut frame, &first_depth);
         }
-        encode(&mut frame, inputs.encodings, mixed);
-        encode(&mut lit_lines, inputs.encodings, mixed);
-        crate::edges::draw(&mut frame, &lit_lines.color, &first_depth, inputs.edges, view);
+        crate::edges::draw(&mut frame, &lit_lines, &first_depth, inputs.edges, view);
+        let mut convert_ms = ms(start);
+        if let Some(pattern) = pattern {
+            let start = Instant::now();
+            let pixels = divided_pixels(&frame);
+            if !pixels.is_empty() {
+                let image = SampleImage::new(pixels, pattern, [view.width, view.height]);
+                let options = RenderOptions {
+                    width: SampleImage::WIDTH,
+                    height: image.height,
+                    points: Some(Arc::clone(&image.points)),
+                    shading_points: Some(Arc::clone(&image.centres)),
+                    ..options
+                };
+                let mut samples = Traced::new(renderer, inputs, &options, mixed)?;
+                if opaque_background {
+                    clear_background(&mut samples.frame, &samples.first_depth);
+                }
+                if !inputs.edges.is_empty() {
+                    // As in OpenGL, a pixel's samples have the lines of its centre.
+                    let owners = image.owners();
+                    let lines = &samples.lit_lines;
+                    crate::edges::draw_inside(
+                        &mut samples.frame,
+                        lines,
+                        inputs.edges,
+                        view,
+                        |at| owners[at] as usize,
+                    );
+                }
+                image.resolve(&samples.frame, &mut frame);
+                rays += samples.rays;
+            }
+            trace_ms += ms(start);
+        }
+
+        let start = Instant::now();
         (self.width, self.height) = (view.width, view.height);
         std::mem::swap(&mut self.depth, &mut frame.depth);
         if blend {
@@ -133,11 +156,71 @@ impl WindowImage {
             self.first_depth.clear();
             let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
             let pixels = frame.color.par_iter().with_min_len(CHUNK);
-            pixels.map(|c| c.map(byte)).collect_into_vec(&mut self.opaque);
+            // Where the window's samples are taken, alpha is the part of a pixel that is covered.
+            let partly = |c: &[f32; 4]| pattern.is_some() && c[3] > 0.0 && c[3] < 1.0;
+            pixels
+                .map(|c| {
+                    let [r, g, b, a] = *c;
+                    if partly(c) { [r / a, g / a, b / a, a].map(byte) } else { c.map(byte) }
+                })
+                .collect_into_vec(&mut self.opaque);
         }
-        let warnings = output.report.warnings;
         renderer.recycle(frame);
-        Ok(DrawResult { rays: output.report.rays, warnings, trace_ms, convert_ms: ms(start) })
+        convert_ms += ms(start);
+        Ok(DrawResult { rays, warnings, trace_ms, convert_ms })
+    }
+}
+
+/// What one image of rays gives, encoded for the window.
+struct Traced {
+    frame: Frame,
+    /// See [`RenderInputs::lines`]; empty without.
+    lit_lines: Vec<[f32; 4]>,
+    /// Depth of the first surface where that may not be the frame's; else empty.
+    first_depth: Vec<f32>,
+    rays: RayStats,
+    warnings: Vec<String>,
+}
+
+impl Traced {
+    fn new(
+        renderer: &mut Renderer,
+        inputs: &RenderInputs<'_>,
+        options: &RenderOptions,
+        mixed: bool,
+    ) -> Result<Traced, BridgeError> {
+        let output = renderer.render(inputs.scene, inputs.camera, options)?;
+        let mut frame = output.frame;
+        let opaque_background = !matches!(inputs.scene.background, Background::Transparent);
+        let mut lit_lines = match inputs.lines {
+            Some(lines) => {
+                let wanted = if mixed { Layers::COLOR | Layers::IDS } else { Layers::COLOR };
+                let options = RenderOptions { layers: wanted, ..options.clone() };
+                renderer.render(lines, inputs.camera, &options)?.frame
+            }
+            None => Frame::default(),
+        };
+        let effects = inputs.options.effects.unwrap_or(Effects::NONE);
+        let first_depth = if effects.contains(Effects::TRANSPARENCY) || opaque_background {
+            let depth_only = RenderOptions {
+                layers: Layers::DEPTH,
+                samples: 1,
+                depth_min_opacity: inputs.options.depth_min_opacity,
+                ..options.clone()
+            };
+            renderer.render(inputs.scene, inputs.camera, &depth_only)?.frame.depth
+        } else {
+            Vec::new()
+        };
+        encode(&mut frame, inputs.encodings, mixed);
+        encode(&mut lit_lines, inputs.encodings, mixed);
+        Ok(Traced {
+            frame,
+            lit_lines: lit_lines.color,
+            first_depth,
+            rays: output.report.rays,
+            warnings: output.report.warnings,
+        })
     }
 }
 

@@ -305,6 +305,8 @@ impl Host {
         {
             command.env_remove(name);
         }
+        // Rays are measured also where vtk-bridge would leave the frame to OpenGL.
+        command.env("RTV_ALWAYS_TRACE", "1");
         let out = command.output().context("sh")?;
         let stdout = String::from_utf8_lossy(&out.stdout);
         let errors = String::from_utf8_lossy(&out.stderr);

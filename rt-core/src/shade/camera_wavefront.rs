@@ -98,7 +98,7 @@ fn generate_pinhole_rays<S: Simd>(
             (centres[0][k][lane], centres[1][k][lane]) = (x, y);
         }
     }
-    let spread = context.options.samples > 1;
+    let (spread, listed) = (context.options.samples > 1, context.options.points.is_some());
     let mut sampler = SamplerBlock::new(context.options.sampling);
     for (b, block) in blocks.iter_mut().enumerate() {
         let [column, row] = block_place(b);
@@ -122,6 +122,16 @@ fn generate_pinhole_rays<S: Simd>(
                 for lane in 0..LANES {
                     [x[lane], y[lane]] =
                         context.ndc(px[lane], py[lane], [at[0][lane], at[1][lane]]);
+                }
+                context.camera_rays.fill_block(simd, &x, &y, block)
+            }
+            _ if listed => {
+                let (mut x, mut y) = ([0.0; LANES], [0.0; LANES]);
+                for lane in 0..LANES {
+                    let [i, j] = lane_pixel(lane);
+                    let (px, py) = (4 * column + i, 4 * row + j);
+                    [x[lane], y[lane]] =
+                        context.ndc(area.x + px as u32, area.y + py as u32, [0.5; 2]);
                 }
                 context.camera_rays.fill_block(simd, &x, &y, block)
             }

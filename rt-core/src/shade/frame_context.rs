@@ -148,9 +148,14 @@ impl<'a> FrameContext<'a> {
         Sampler::new(self.options.sampling, self.options.seed, x, y, sample)
     }
 
-    /// NDC of the point (`dx`, `dy`) of pixel (`x`, `y`).
+    /// NDC of the point (`dx`, `dy`) of pixel (`x`, `y`), or of the point given for it.
     #[inline]
     pub(crate) fn ndc(&self, x: u32, y: u32, [dx, dy]: [f32; 2]) -> [f64; 2] {
+        if let Some(points) = &self.options.points {
+            // Tiles may extend beyond the image's edge.
+            let at = y as usize * self.options.width as usize + x as usize;
+            return points.get(at).copied().unwrap_or_default();
+        }
         let size = [self.options.width, self.options.height];
         Camera::ndc_of_pixel(x as f64 + dx as f64, y as f64 + dy as f64, size)
     }

@@ -415,6 +415,13 @@ impl<'a> ResolvedInstance<'a> {
         }
     }
 
+    /// Corners of a triangle in render space; `None` for other shapes.
+    pub(crate) fn triangle(&self, primitive: u32) -> Option<[DVec3; 3]> {
+        let Source::Mesh(mesh) = self.source else { return None };
+        let corners = mesh.triangle(primitive as usize);
+        Some(corners.map(|p| self.render_from_object.transform_point3(p.as_dvec3())))
+    }
+
     fn object_ray(&self, ray: &Ray) -> Ray {
         if !self.moved {
             return *ray;

@@ -4,11 +4,12 @@ import os
 
 import numpy as np
 
-ABI = 827436969
+ABI = 67577348
 NONE, U8, F32, F64, I32, I64 = range(6)
 COLOR_PROPERTY, COLOR_POINTS, COLOR_CELLS, COLOR_MAPPED = range(4)
 LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SPOT = range(3)
 POINTS, WIREFRAME, SURFACE = range(3)
+CHOICE_RAYS, CHOICE_OPENGL, CHOICE_ASK_AGAIN = range(3)
 TEXTURE, TEXTURE_TRANSFORM, TEXTURE_CUBE_MAP = 1, 2, 4
 _KINDS = {np.dtype(np.uint8): U8, np.dtype(np.float32): F32, np.dtype(np.float64): F64, np.dtype(np.int32): I32, np.dtype(np.int64): I64}
 
@@ -81,6 +82,7 @@ class View(C.Structure):
     _fields_ = [
         ("clip_from_world", C.c_double * 16), ("background_bottom", C.c_float * 3), ("background_top", C.c_float * 3),
         ("focus_distance", C.c_double), ("width", C.c_uint32), ("height", C.c_uint32), ("interactive", C.c_uint32), ("shadows", C.c_uint32),
+        ("window_samples", C.c_uint32), ("reserved", C.c_uint32),
     ]
 
 
@@ -99,6 +101,12 @@ class ActorFacts(C.Structure):
     _fields_ += [("edge_tint", C.c_double * 3)]
     _fields_ += [(n, C.c_uint32) for n in (
         "shader_code", "glyphs", "texture", "num_textures", "albedo", "material", "normal", "emissive", "no_data", "reserved")]
+
+
+class SceneFacts(C.Structure):
+    _fields_ = [("pixels", C.c_uint64)]
+    _fields_ += [(n, C.c_uint32) for n in ("props", "shadows", "known", "software", "python", "volumes", "translucent", "edges")]
+    _fields_ += [("triangles", C.c_uint64)]
 
 
 class SurfaceFacts(C.Structure):
@@ -173,6 +181,7 @@ def _functions(library, path):
         surfaces=bind("rtv_surfaces", C.c_int32, p, C.POINTER(Surface), C.c_uint64),
         has_colors=bind("rtv_has_colors", C.c_int32, p, C.c_uint64, C.c_uint64),
         volume=bind("rtv_volume", text, p, C.POINTER(Volume)), has_volume=bind("rtv_has_volume", C.c_int32, p, C.c_uint64),
+        choose=bind("rtv_choose", C.c_uint32, p, C.POINTER(SceneFacts)),
         check_actor=bind("rtv_check_actor", text, p, C.POINTER(ActorFacts)),
         check_surface=bind("rtv_check_surface", text, p, C.POINTER(SurfaceFacts)),
         check_glyphs=bind("rtv_check_glyphs", text, p, C.POINTER(GlyphFacts)),
@@ -211,5 +220,5 @@ class Bridge:
             raise AttributeError(name)
         function = Bridge._calls[name]
         if name in ("warn", "pass_on", "option"):
-            return lambda *texts: function(self._handle, *(t.encode() for t in texts))
+            return lambda *texts: function(self._handle, *(t and t.encode() for t in texts))
         return lambda *arguments: function(self._handle, *arguments)

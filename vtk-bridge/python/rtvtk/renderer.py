@@ -10,6 +10,7 @@ import vtkmodules.vtkRenderingOpenGL2 as gl
 from vtkmodules.vtkCommonCore import vtkVersion, vtkWeakReference
 
 from . import library as rtv
+from .choice import Choice
 from .eligibility import Untraceable
 from .extract import Extractor
 from .overlay import Overlay
@@ -55,6 +56,7 @@ _renderers, _windows = _Watched(), _Watched()
 class _Tracer:
     def __init__(self):
         self.bridge = rtv.Bridge()
+        self.choice = Choice(self.bridge)
         self.extractor = Extractor(self.bridge)
         self.overlay = Overlay()
         self.hidden, self.shown, self.switched = [], [], []
@@ -80,9 +82,18 @@ class _Tracer:
         if renderer.GetSelector() is not None or renderer.GetUseHiddenLineRemoval() or renderer.GetRenderWindow() is None:
             return
         width, height = size_of(renderer)
+        if width < 1 or height < 1 or not self.bridge.begin():
+            return
         props = renderer.GetViewProps()
+        cheaper = self.choice.opengl_draws(renderer, (width, height))
+        if cheaper and not self.bridge.option("RTV_REPORT"):
+            self.bridge.end()
+            return
         visible = [p for p in (props.GetItemAsObject(i) for i in range(props.GetNumberOfItems())) if p.GetVisibility()]
-        if width < 1 or height < 1 or not visible or not self.bridge.begin():
+        if cheaper or not visible:
+            for i, prop in enumerate(visible):
+                self.bridge.pass_on(f"{prop.GetClassName()} {i}", None)
+            self.bridge.end()
             return
         # Render passes read props, depths and normals themselves, except this one, which only draws
         # at a larger size.

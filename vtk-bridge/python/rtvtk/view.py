@@ -43,6 +43,14 @@ def size_of(renderer):
     return tuple(pixels(i, whole) for i, whole in enumerate(window.GetSize()))
 
 
+def _samples(renderer):
+    """Samples of a pixel of the framebuffer that this frame is drawn into."""
+    # The pass draws into a larger framebuffer of its own.
+    if renderer.GetPass() is not None:
+        return 0
+    return max(0, renderer.GetRenderWindow().GetRenderFramebuffer().GetMultiSamples())
+
+
 def view_of(renderer, width, height):
     out = rtv.View()
     camera = renderer.GetActiveCamera()
@@ -58,4 +66,5 @@ def view_of(renderer, width, height):
     # While the mouse rotates the scene, interactors request several frames a second; for still images far less than one.
     out.interactive = renderer.GetRenderWindow().GetDesiredUpdateRate() > 1.0
     out.shadows = bool(renderer.GetUseShadows())
+    out.window_samples = _samples(renderer)
     return out

@@ -210,3 +210,37 @@ pub struct RtvVolumeFacts {
     /// Scalars that RTV_BLEND_AVERAGE takes the mean of.
     pub average_range: [f64; 2],
 }
+
+/// Answers of rtv_choose: rays.
+pub const RTV_CHOICE_RAYS: u32 = 0;
+/// OpenGL: nothing is added to the frame.
+pub const RTV_CHOICE_OPENGL: u32 = 1;
+/// The caller has to collect the scene's facts and ask again.
+pub const RTV_CHOICE_ASK_AGAIN: u32 = 2;
+
+/// A renderer's scene, for the choice between rays and OpenGL. The first three fields are always
+/// set, the others only when rtv_choose asks for them.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct RtvSceneFacts {
+    /// Pixels of the viewport.
+    pub pixels: u64,
+    /// Props.
+    pub props: u32,
+    /// 1 when the program itself asks for shadows.
+    pub shadows: u32,
+    /// 1 when the fields below are set.
+    pub known: u32,
+    /// 1 if OpenGL's driver works on the processor.
+    pub software: u32,
+    /// 1 for the Python package.
+    pub python: u32,
+    /// Visible volumes.
+    pub volumes: u32,
+    /// Visible props with translucent surfaces.
+    pub translucent: u32,
+    /// Visible props with edges.
+    pub edges: u32,
+    /// Triangles of the visible props, in all copies.
+    pub triangles: u64,
+}

@@ -26,6 +26,9 @@ use state::{BridgeState, set_option, with};
 use std::ffi::CStr;
 use std::os::raw::c_char;
 
+/// Why OpenGL draws a volume among opaque surfaces that are traced.
+const VOLUME_LEFT: &str = "cheaper in OpenGL, and no effect needs rays (RTV_ALWAYS_TRACE=1 traces)";
+
 /// A renderer's side of the bridge.
 pub struct RtvBridge {
     _private: [u8; 0],
@@ -33,7 +36,7 @@ pub struct RtvBridge {
 
 /// Version of this interface, computed from its structures and calls (a test gives the value). A
 /// shim built for another version must not continue.
-pub const RTV_ABI: u32 = 827_436_969;
+pub const RTV_ABI: u32 = 67_577_348;
 
 /// [`RTV_ABI`] of the library.
 #[unsafe(no_mangle)]
@@ -124,6 +127,20 @@ pub extern "C" fn rtv_host(vtk_major: u32, vtk_minor: u32, vtk_build: u32) {
 pub unsafe extern "C" fn rtv_begin(bridge: *mut RtvBridge) -> i32 {
     // SAFETY: the caller's promise, for this and all calls below.
     unsafe { with(bridge, 0, |h| h.begin()) }
+}
+
+/// Says who draws this frame: one of RTV_CHOICE_*. Where the picture is the same either way and a
+/// model says that OpenGL is cheaper, it is OpenGL. Call it after `rtv_begin`, before anything is
+/// added; a caller that does not ask traces.
+///
+/// # Safety
+/// As `rtv_begin`; `facts` is null or valid.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtv_choose(bridge: *mut RtvBridge, facts: *const RtvSceneFacts) -> u32 {
+    // SAFETY: as above.
+    let Some(f) = (unsafe { facts.as_ref() }) else { return RTV_CHOICE_RAYS };
+    // SAFETY: as above.
+    unsafe { with(bridge, RTV_CHOICE_RAYS, |h| h.choose(f)) }
 }
 
 /// Adds a surface: 1 if it will be traced, 0 if it has nothing to trace, -1 if its arrays are
@@ -302,12 +319,14 @@ pub unsafe extern "C" fn rtv_check_volume(
     unsafe {
         with(bridge, c"internal error".as_ptr(), |h| {
             let (volume, mapper) = (text(f.volume_class), text(f.mapper_class));
-            h.reason(eligibility::volume(f, &volume, &mapper))
+            let cheaper = h.volumes_are_left().then(|| VOLUME_LEFT.to_owned());
+            h.reason(cheaper.or_else(|| eligibility::volume(f, &volume, &mapper).map(Into::into)))
         })
     }
 }
 
-/// Records for the report that OpenGL draws something, and why.
+/// Records for the report that OpenGL draws something, and why; null for the reason of
+/// `rtv_choose`.
 ///
 /// # Safety
 /// As `rtv_begin`; texts are null or end with a zero byte.
@@ -318,7 +337,12 @@ pub unsafe extern "C" fn rtv_pass(
     reason: *const c_char,
 ) {
     // SAFETY: as above.
-    unsafe { with(bridge, (), |h| h.bridge.report_untraced(&text(name), &text(reason))) }
+    unsafe {
+        with(bridge, (), |h| {
+            let reason = if reason.is_null() { h.choice_reason() } else { text(reason) };
+            h.bridge.report_untraced(&text(name), &reason);
+        })
+    }
 }
 
 /// Warns the user, once for each text.
@@ -352,6 +376,7 @@ pub unsafe extern "C" fn rtv_render(
         interactive: v.interactive != 0,
         shadows: v.shadows != 0,
         samples: 0,
+        window_samples: v.window_samples,
         lens: Some(crate::input::Lens { aperture_radius: 0.0, focus_distance: v.focus_distance }),
     };
     // SAFETY: as above; `picture` is not null.
@@ -428,6 +453,8 @@ pub struct RtvApi {
     pub check_glyphs: unsafe extern "C" fn(*mut RtvBridge, *const RtvGlyphFacts) -> *const c_char,
     /// [`rtv_check_volume`].
     pub check_volume: unsafe extern "C" fn(*mut RtvBridge, *const RtvVolumeFacts) -> *const c_char,
+    /// [`rtv_choose`].
+    pub choose: unsafe extern "C" fn(*mut RtvBridge, *const RtvSceneFacts) -> u32,
 }
 
 static API: RtvApi = RtvApi {
@@ -454,6 +481,7 @@ static API: RtvApi = RtvApi {
     check_surface: rtv_check_surface,
     check_glyphs: rtv_check_glyphs,
     check_volume: rtv_check_volume,
+    choose: rtv_choose,
 };
 
 /// The table; valid as long as the library is loaded.

@@ -1,8 +1,11 @@
 //! The state behind a handle, which is a bridge with its options, and the guard against panics.
 
 use super::eligibility::Radii;
-use super::{RtvBridge, RtvPicture};
+use super::{
+    RTV_CHOICE_ASK_AGAIN, RTV_CHOICE_OPENGL, RTV_CHOICE_RAYS, RtvBridge, RtvPicture, RtvSceneFacts,
+};
 use crate::bridge::Bridge;
+use crate::choice::{Choice, SceneFacts, Way};
 use crate::input::View;
 use crate::options::{Options, readable};
 use crate::report;
@@ -23,6 +26,9 @@ pub(super) struct BridgeState {
     /// Options set for this bridge alone; they take precedence over all others.
     own: OptionValues,
     effective_options: EffectiveOptions,
+    choice: Choice,
+    /// Whether this frame leaves its volumes to OpenGL.
+    volumes_left: bool,
     /// True between `rtv_begin` and `rtv_end`, while options must not change.
     in_frame: bool,
 }
@@ -149,6 +155,7 @@ pub(super) fn set_option(name: &str, value: &str) -> bool {
 /// An option as a number for C callers; -1 for options that they do not need.
 pub(super) fn number(options: &Options, name: &str) -> f64 {
     match name {
+        "RTV_REPORT" => f64::from(u8::from(options.report.is_some())),
         "RTV_OFF" => f64::from(u8::from(options.off)),
         "RTV_POINT_RADIUS" => options.point_radius,
         "RTV_LINE_RADIUS" => options.line_radius,
@@ -166,6 +173,8 @@ impl BridgeState {
             answer: CString::default(),
             own: OptionValues::new(),
             effective_options: EffectiveOptions::NONE,
+            choice: Choice::default(),
+            volumes_left: false,
             in_frame: false,
         }
     }
@@ -206,7 +215,44 @@ impl BridgeState {
             self.bridge.warn(fault.clone());
         }
         self.in_frame = !options.off;
+        self.volumes_left = false;
         i32::from(!options.off && !self.poisoned)
+    }
+
+    /// See `rtv_choose`.
+    pub(super) fn choose(&mut self, f: &RtvSceneFacts) -> u32 {
+        // Ranks trace alike, because their images are put together.
+        if self.bridge.options().need_rays() || f.shadows != 0 || report::ranks() > 1 {
+            return RTV_CHOICE_RAYS;
+        }
+        let facts = (f.known != 0).then(|| SceneFacts {
+            pixels: f.pixels,
+            props: f.props,
+            triangles: f.triangles,
+            volumes: f.volumes,
+            translucent: f.translucent,
+            edges: f.edges,
+            software: f.software != 0,
+            python: f.python != 0,
+        });
+        if facts.is_none() && self.choice.is_due(f.pixels, f.props) {
+            return RTV_CHOICE_ASK_AGAIN;
+        }
+        match self.choice.decide(facts) {
+            Way::OpenGl => RTV_CHOICE_OPENGL,
+            Way::Rays => {
+                self.volumes_left = self.choice.leaves_volumes();
+                RTV_CHOICE_RAYS
+            }
+        }
+    }
+
+    pub(super) fn volumes_are_left(&self) -> bool {
+        self.volumes_left
+    }
+
+    pub(super) fn choice_reason(&self) -> String {
+        self.choice.reason()
     }
 
     pub(super) fn render(&mut self, view: &View) -> Option<RtvPicture> {

@@ -94,6 +94,8 @@ fn view() -> RtvView {
         height: 4,
         interactive: 0,
         shadows: 0,
+        window_samples: 0,
+        reserved: 0,
     }
 }
 

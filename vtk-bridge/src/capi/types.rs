@@ -322,6 +322,11 @@ pub struct RtvView {
     pub interactive: u32,
     /// 1 when the program itself asks for shadows.
     pub shadows: u32,
+    /// Samples of each pixel of the framebuffer that the image is drawn into; 0 or 1 for none. With
+    /// more, the alpha of opaque images is the part of the pixel that is covered.
+    pub window_samples: u32,
+    /// Not used.
+    pub reserved: u32,
 }
 
 /// An image; rows start at the top, and the memory belongs to the bridge until its next call.
@@ -332,7 +337,7 @@ pub struct RtvPicture {
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// RGBA bytes, or null when `blended` is not.
+    /// RGBA bytes, not premultiplied, or null when `blended` is not.
     pub opaque: *const u8,
     /// Premultiplied RGBA, or null.
     pub blended: *const f32,

@@ -16,6 +16,7 @@ pub const SOURCES: &[(&str, &str)] = &[
     ("rtv_arrays.h", include_str!("../../cpp/rtv_arrays.h")),
     ("rtv_arrays.cxx", include_str!("../../cpp/rtv_arrays.cxx")),
     ("rtv_blit.cxx", include_str!("../../cpp/rtv_blit.cxx")),
+    ("rtv_choice.cxx", include_str!("../../cpp/rtv_choice.cxx")),
     ("rtv_extract.cxx", include_str!("../../cpp/rtv_extract.cxx")),
     ("rtv_factory.cxx", include_str!("../../cpp/rtv_factory.cxx")),
     ("rtv_compositing.h", include_str!("../../cpp/rtv_compositing.h")),

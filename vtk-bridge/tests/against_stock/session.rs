@@ -86,7 +86,9 @@ impl Launch {
         {
             command.env_remove(name);
         }
+        // The scenes are small: OpenGL would draw most of them, and nothing would be compared.
         command
+            .env("RTV_ALWAYS_TRACE", "1")
             .env_remove("VTK_AUTOLOAD_PATH")
             .env_remove("PV_PLUGIN_PATH")
             .env_remove("PYTHONPATH");

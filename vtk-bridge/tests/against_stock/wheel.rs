@@ -49,7 +49,8 @@ fn same_as_stock(folder: &str) -> Option<[Run; 2]> {
 
 #[test]
 fn unmodified_scripts_look_the_same_in_the_stock_wheel() {
-    let Some([_, ours]) = same_as_stock("vtk") else { return };
+    let Some([stock, ours]) = same_as_stock("vtk") else { return };
+    crate::vtk::check_samples(&stock, &ours, &["glyphs", "isosurface", "creases", "edges"]);
     let capture = ours.capture("reasons", "reasons").unwrap();
     assert_eq!(capture.passed("reason"), capture.expected_reasons(), "the reasons are the shim's");
 }
@@ -80,4 +81,34 @@ fn shadows_come_to_the_wheel_by_their_variable() {
     };
     let (darker, brighter) = (by_20(&plain.rgb, &shadows.rgb), by_20(&shadows.rgb, &plain.rgb));
     assert!(darker > 500 && brighter < darker / 20, "{darker} darker, {brighter} brighter");
+}
+
+/// Without `RTV_ALWAYS_TRACE`: OpenGL draws what it draws faster, and the report says why.
+#[test]
+fn small_scenes_and_first_images_are_opengls_own_and_large_meshes_are_traced() {
+    let ask = [("RTV_ALWAYS_TRACE", "0")];
+    let names = ["contours", "many_actors", "volume"].map(str::to_owned);
+    let (stock, ours) = (
+        run(With::Stock, "vtk", &names, &[("LC_ALL", "C")]),
+        run(With::Bridge, "vtk", &names, &ask),
+    );
+    let (Some(stock), Some(ours)) = (stock, ours) else { return };
+    for script in &names {
+        for image in stock.images(script).unwrap() {
+            let [a, b] = [&stock, &ours].map(|r| r.capture(script, &image).unwrap());
+            assert_eq!(b.traced_elements(), 0, "{script}/{image}");
+            assert!(a.rgb == b.rgb && a.depth == b.depth, "{script}/{image} is not stock's");
+            let reasons = b.passed("reason");
+            assert!(!reasons.is_empty(), "{script}/{image}");
+            let known = ["the first image", "cheaper in OpenGL", "OpenGL's driver is hardware"];
+            let says = |r: &String| known.iter().any(|k| r.starts_with(k));
+            assert!(reasons.iter().all(says), "{script}/{image}: {reasons:?}");
+        }
+    }
+    let Some(frames) = run(With::Bridge, "wheel", &["many_frames".to_owned()], &ask) else {
+        return;
+    };
+    let traced = ["first", "last"]
+        .map(|image| frames.capture("many_frames", image).unwrap().traced_elements() > 0);
+    assert_eq!(traced, [false, true]);
 }

@@ -6,6 +6,7 @@
 //! the other: 30 of 60 ns per pixel). So a tile first prefetches its triangles, then their
 //! vertices, and only then reads them.
 
+mod elsewhere;
 mod light;
 
 use super::direct::incident_from;
@@ -14,7 +15,7 @@ use super::layers::record_block;
 use super::lobes::{ambient_albedo, response};
 use super::response_block::supports;
 use super::tile::{PIXELS, TileArea, TileLayers};
-use super::{OPAQUE, Workspace, generate_camera_rays, prefetch_surfaces};
+use super::{OPAQUE, Workspace, generate_camera_rays, prefetch_surfaces, record_camera_hits};
 use crate::bvh::{Coherence, InstanceFilter};
 use crate::effects::Effects;
 use crate::environment::Background;
@@ -55,6 +56,14 @@ pub(super) fn render_tile(
     let mut pixels = std::mem::take(if first { &mut out.color } else { &mut work.pixels });
     pixels.resize(PIXELS, [0.0; 4]);
     prefetch_surfaces(context, &work.hits);
+    let mut record = record;
+    if context.options.shading_points.is_some() {
+        // Depth and ids are those of the rays.
+        if std::mem::take(&mut record) {
+            record_camera_hits(context, area, out, work);
+        }
+        elsewhere::move_hits(context, area, &mut work.current.blocks, &mut work.hits);
+    }
     light(context, area, out, work, &mut pixels, record, stats);
     if first {
         out.start_samples(pixels);
