@@ -3,7 +3,7 @@
 //! The steps are a list in [`plan`]; [`runner`] runs them and prints their cost; [`tools`] checks
 //! the machine; [`peers`] finds and installs the third-party software that some tests compare with;
 //! [`licences`] checks what we link against; [`package`] checks what we publish; [`dist`] makes
-//! packages for machines without Rust.
+//! packages for machines without Rust; [`systems`] runs tests on other releases of Debian.
 
 mod command;
 mod dist;
@@ -14,10 +14,12 @@ mod peers;
 mod plan;
 mod runner;
 mod step;
+mod systems;
 mod tools;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use step::Outcome;
 
 const HELP: &str = "\
 Set-up and checks of the workspace.
@@ -48,6 +50,13 @@ cargo xtask dist [--profile NAME] [--out FOLDER]
       --profile NAME    build with this profile of cargo's instead of `release`
       --out FOLDER      put them there instead of into target/dist
 
+cargo xtask systems [--suite NAME] [--paraview] [--record]
+    Makes a small system of another release of Debian in target/systems (as root), and runs the \
+    comparisons with stock programs there.
+      --suite NAME      trixie (Debian 13, which CI tries) or forky (the next)
+      --paraview        ParaView too: 1.8 GB more
+      --record          write the result into the book's page on systems
+
 cargo xtask book
     Updates the tables and plots of the book from the records in bench/runs.
 
@@ -66,6 +75,7 @@ enum Command {
     Book,
     CiList,
     Dist(dist::DistOptions),
+    Systems(systems::SystemsOptions),
     Test(TestOptions),
     Vtk { release: bool, install: Vec<String> },
 }
@@ -104,6 +114,7 @@ fn parse(args: &[String]) -> Result<Command, String> {
         "setup" => no_options(Command::Setup),
         "book" => no_options(Command::Book),
         "ci-list" => no_options(Command::CiList),
+        "systems" => systems::SystemsOptions::parse(rest).map(Command::Systems),
         "dist" => dist::DistOptions::parse(rest).map(Command::Dist),
         "test" => {
             let mut options = TestOptions::default();
@@ -141,7 +152,7 @@ fn parse(args: &[String]) -> Result<Command, String> {
             install: rest.iter().filter(|a| *a != "--release").cloned().collect(),
         }),
         other => Err(format!(
-            "no command `{other}`; there are test, setup, vtk, dist, book, ci-list and \
+            "no command `{other}`; there are test, setup, vtk, dist, systems, book, ci-list and \
              help"
         )),
     }
@@ -213,6 +224,21 @@ fn main() -> ExitCode {
                 Ok(()) => Exit::Success,
                 Err(message) => {
                     eprintln!("error: {message}");
+                    Exit::StepFailed
+                }
+            }
+        }
+        Ok(Command::Systems(options)) => {
+            let build = main_job::build_folder(&workspace_root(), build_folder_named());
+            let place = systems::Place { root: &workspace_root(), build, may_install: true };
+            match systems::run(&place, &options) {
+                Outcome::Passed => Exit::Success,
+                Outcome::NotRun(why) => {
+                    println!("not run: {why}");
+                    Exit::Success
+                }
+                Outcome::Failed(why) | Outcome::PeerMissing(why) => {
+                    eprintln!("error: {why}");
                     Exit::StepFailed
                 }
             }
