@@ -31,10 +31,12 @@
 //! assert_eq!(status_of(work(["program", "three"])), Status::Usage);
 //! ```
 
+use anyhow::Context as _;
 pub use indicatif::ProgressBar;
 use indicatif::{ProgressDrawTarget, ProgressStyle, WeakProgressBar};
 use std::fmt::{self, Display};
 use std::io::{self, IsTerminal, Write};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, OnceLock};
@@ -284,6 +286,22 @@ impl CompletionsArgs {
     }
 }
 
+/// Arguments of the hidden `man` subcommand, which packages are made with.
+#[derive(Debug, Clone, clap::Args)]
+pub struct ManArgs {
+    /// The folder, which exists. The pages are `PROGRAM.1` and `PROGRAM-SUBCOMMAND.1`.
+    pub folder: PathBuf,
+}
+
+impl ManArgs {
+    /// Writes the pages of program `C`. Errors name the folder.
+    pub fn write<C: clap::CommandFactory>(&self) -> anyhow::Result<()> {
+        clap_mangen::generate_to(C::command(), &self.folder)
+            .with_context(|| format!("{}: cannot write manual pages", self.folder.display()))
+            .cure("name a folder that exists and that you may write to")
+    }
+}
+
 /// The progress bar that may be on the screen.
 static VISIBLE_BAR: Mutex<Option<WeakProgressBar>> = Mutex::new(None);
 
@@ -379,6 +397,17 @@ mod tests {
         if !io::stderr().is_terminal() {
             assert!(CommonArgs::default().progress(3, "tiles").is_hidden());
         }
+    }
+
+    #[test]
+    fn manual_pages_are_written_and_a_missing_folder_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        ManArgs { folder: folder.path().into() }.write::<Args>().unwrap();
+        let page = std::fs::read_to_string(folder.path().join("prog.1")).unwrap();
+        assert!(page.contains(".TH prog 1") && page.contains("quiet"), "{page}");
+        let missing = folder.path().join("missing");
+        let error = ManArgs { folder: missing.clone() }.write::<Args>().unwrap_err();
+        assert!(report(&error).contains(missing.to_str().unwrap()), "{}", report(&error));
     }
 
     #[test]

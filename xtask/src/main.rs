@@ -2,9 +2,11 @@
 //!
 //! The steps are a list in [`plan`]; [`runner`] runs them and prints their cost; [`tools`] checks
 //! the machine; [`peers`] finds and installs the third-party software that some tests compare with;
-//! [`licences`] checks what we link against; [`package`] checks what we publish.
+//! [`licences`] checks what we link against; [`package`] checks what we publish; [`dist`] makes
+//! packages for machines without Rust; [`systems`] runs tests on other releases of Debian.
 
 mod command;
+mod dist;
 mod licences;
 mod main_job;
 mod package;
@@ -12,10 +14,12 @@ mod peers;
 mod plan;
 mod runner;
 mod step;
+mod systems;
 mod tools;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use step::Outcome;
 
 const HELP: &str = "\
 Set-up and checks of the workspace.
@@ -41,6 +45,18 @@ cargo xtask vtk [--release] [OPTIONS OF vtk-bridge install]
       --release         build it optimised, into target/release
       --prefix FOLDER, --include FOLDER, --plugin    as of `vtk-bridge install`
 
+cargo xtask dist [--profile NAME] [--out FOLDER]
+    Makes a tarball and a Debian package of all programs, for machines without Rust.
+      --profile NAME    build with this profile of cargo's instead of `release`
+      --out FOLDER      put them there instead of into target/dist
+
+cargo xtask systems [--suite NAME] [--paraview] [--record]
+    Makes a small system of another release of Debian in target/systems (as root), and runs the \
+    comparisons with stock programs there.
+      --suite NAME      trixie (Debian 13, which CI tries) or forky (the next)
+      --paraview        ParaView too: 1.8 GB more
+      --record          write the result into the book's page on systems
+
 cargo xtask book
     Updates the tables and plots of the book from the records in bench/runs.
 
@@ -58,6 +74,8 @@ enum Command {
     Setup,
     Book,
     CiList,
+    Dist(dist::DistOptions),
+    Systems(systems::SystemsOptions),
     Test(TestOptions),
     Vtk { release: bool, install: Vec<String> },
 }
@@ -96,6 +114,8 @@ fn parse(args: &[String]) -> Result<Command, String> {
         "setup" => no_options(Command::Setup),
         "book" => no_options(Command::Book),
         "ci-list" => no_options(Command::CiList),
+        "systems" => systems::SystemsOptions::parse(rest).map(Command::Systems),
+        "dist" => dist::DistOptions::parse(rest).map(Command::Dist),
         "test" => {
             let mut options = TestOptions::default();
             let mut rest = rest.iter();
@@ -131,9 +151,10 @@ fn parse(args: &[String]) -> Result<Command, String> {
             release: rest.iter().any(|a| a == "--release"),
             install: rest.iter().filter(|a| *a != "--release").cloned().collect(),
         }),
-        other => {
-            Err(format!("no command `{other}`; there are test, setup, vtk, book, ci-list and help"))
-        }
+        other => Err(format!(
+            "no command `{other}`; there are test, setup, vtk, dist, systems, book, ci-list and \
+             help"
+        )),
     }
 }
 
@@ -143,6 +164,11 @@ fn workspace_root() -> PathBuf {
         .parent()
         .expect("xtask lies inside the workspace")
         .to_owned()
+}
+
+/// The folder that the environment names for cargo to build in.
+fn build_folder_named() -> Option<PathBuf> {
+    std::env::var_os("CARGO_TARGET_DIR").map(PathBuf::from)
 }
 
 /// Builds vtk-bridge and runs its own installation; it handles its options and messages itself.
@@ -192,6 +218,31 @@ fn main() -> ExitCode {
         }
         Ok(Command::Vtk { release, install }) => vtk(release, &install),
         Ok(Command::Book) => run_member("bench", &["--", "quote"]),
+        Ok(Command::Dist(options)) => {
+            let build = main_job::build_folder(&workspace_root(), build_folder_named());
+            match dist::run(&workspace_root(), &build, &options) {
+                Ok(()) => Exit::Success,
+                Err(message) => {
+                    eprintln!("error: {message}");
+                    Exit::StepFailed
+                }
+            }
+        }
+        Ok(Command::Systems(options)) => {
+            let build = main_job::build_folder(&workspace_root(), build_folder_named());
+            let place = systems::Place { root: &workspace_root(), build, may_install: true };
+            match systems::run(&place, &options) {
+                Outcome::Passed => Exit::Success,
+                Outcome::NotRun(why) => {
+                    println!("not run: {why}");
+                    Exit::Success
+                }
+                Outcome::Failed(why) | Outcome::PeerMissing(why) => {
+                    eprintln!("error: {why}");
+                    Exit::StepFailed
+                }
+            }
+        }
         Ok(Command::Test(options)) => runner::run(&workspace_root(), &options),
     };
     ExitCode::from(exit as u8)

@@ -20,7 +20,7 @@ pub(crate) fn run(context: &Context<'_>) -> Outcome {
     if built != Outcome::Passed {
         return built;
     }
-    let bench = build_folder(context.root, std::env::var_os("CARGO_TARGET_DIR").map(PathBuf::from))
+    let bench = build_folder(context.root, crate::build_folder_named())
         .join("debug")
         .join(format!("bench{}", std::env::consts::EXE_SUFFIX));
     println!("{}", bench.display());
@@ -36,7 +36,7 @@ pub(crate) fn run(context: &Context<'_>) -> Outcome {
 
 /// The directory where cargo builds; a relative path is relative to the root, where cargo is
 /// started.
-fn build_folder(root: &Path, named: Option<PathBuf>) -> PathBuf {
+pub(crate) fn build_folder(root: &Path, named: Option<PathBuf>) -> PathBuf {
     root.join(named.unwrap_or_else(|| "target".into()))
 }
 

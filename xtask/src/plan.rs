@@ -6,7 +6,7 @@
 //! dev profile, whose members are optimised.
 
 use crate::step::{Action, Step};
-use crate::{licences, main_job, package, tools};
+use crate::{licences, main_job, package, systems, tools};
 
 const fn cargo(args: &'static [&'static str]) -> Action {
     Action::Cargo { args, env: &[] }
@@ -129,6 +129,12 @@ pub(crate) const STEPS: &[Step] = &[
         name: "book-and-doc-tests",
         tells: "the examples in the documentation and in the book compile and hold",
         action: cargo(&["test", "--workspace", "--no-fail-fast", "--doc"]),
+    },
+    Step {
+        name: "next-systems",
+        tells: "the comparisons with stock VTK and OpenGL programs pass on the next release of \
+                Debian too, where chroots are allowed",
+        action: Action::Call(systems::check),
     },
     Step {
         name: "counters",

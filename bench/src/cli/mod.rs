@@ -9,7 +9,7 @@ mod report;
 mod run;
 
 use clap::{Args, Parser, Subcommand};
-use datasets::cli::{CommonArgs, CompletionsArgs, run_main};
+use datasets::cli::{CommonArgs, CompletionsArgs, ManArgs, run_main};
 use rt_core::bvh::{BuildQuality, Robustness};
 use rt_core::effects::Effects;
 use rt_core::environment::Background;
@@ -48,6 +48,9 @@ enum Command {
     Peers,
     /// Prints a completion script for a shell
     Completions(CompletionsArgs),
+    /// Writes the manual pages of the program and its subcommands into a folder
+    #[command(hide = true)]
+    Man(ManArgs),
 }
 
 /// Options of `bench run`.
@@ -178,6 +181,7 @@ fn execute(cli: Cli) -> anyhow::Result<()> {
         Some(Command::Image(args)) => render::gallery_image(common, &args),
         Some(Command::Peers) => peers::peers(common),
         Some(Command::Completions(args)) => args.print::<Cli>(),
+        Some(Command::Man(args)) => args.write::<Cli>(),
     }
 }
 

@@ -17,7 +17,7 @@ mod smpirun;
 mod timeline;
 
 use clap::{Parser, Subcommand};
-use datasets::cli::{CommonArgs, CompletionsArgs, Status, status_of};
+use datasets::cli::{CommonArgs, CompletionsArgs, ManArgs, Status, status_of};
 use std::ffi::OsString;
 
 /// Composites the images of many ranks into one.
@@ -45,6 +45,9 @@ enum Command {
     Doctor,
     /// Prints a completion script for a shell
     Completions(CompletionsArgs),
+    /// Writes the manual pages of the program and its subcommands into a folder
+    #[command(hide = true)]
+    Man(ManArgs),
 }
 
 /// Runs the program. Exit codes: 0 done, 1 failed, 2 wrong usage or something missing, 130
@@ -64,5 +67,6 @@ fn execute(arguments: &[OsString]) -> anyhow::Result<Status> {
         Command::Check(args) => check::check(common, &args, own),
         Command::Doctor => doctor::doctor(common),
         Command::Completions(args) => args.print::<Cli>().map(Into::into),
+        Command::Man(args) => args.write::<Cli>().map(Into::into),
     }
 }

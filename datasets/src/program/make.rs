@@ -15,7 +15,7 @@ use std::path::PathBuf;
 #[command(after_help = "Examples:
   datasets make wavelet --size 1M -o wavelet.vtp
   datasets make combustion-jet --size small -o jet.vti --compress
-  datasets make star -o star.vtp")]
+  datasets make torus -o torus.vtp")]
 pub(super) struct MakeArgs {
     /// The data set, as `datasets list` names it
     name: String,

@@ -7,7 +7,7 @@ mod make;
 mod output;
 
 use clap::{Parser, Subcommand};
-use datasets::cli::{CommonArgs, CompletionsArgs, run_main};
+use datasets::cli::{CommonArgs, CompletionsArgs, ManArgs, run_main};
 use std::process::ExitCode;
 
 const EXAMPLES: &str = "Examples:
@@ -41,6 +41,9 @@ enum Command {
     Convert(convert::ConvertArgs),
     /// Prints a completion script for a shell
     Completions(CompletionsArgs),
+    /// Writes the manual pages of the program and its subcommands into a folder
+    #[command(hide = true)]
+    Man(ManArgs),
 }
 
 /// Runs the program. Exit codes: 0 done, 1 failed, 2 usage error, 130 interrupted.
@@ -56,6 +59,7 @@ fn execute(cli: Cli) -> anyhow::Result<()> {
         Command::Info(args) => info::info(common, &args),
         Command::Convert(args) => convert::convert(common, &args),
         Command::Completions(args) => args.print::<Cli>(),
+        Command::Man(args) => args.write::<Cli>(),
     }
 }
 

@@ -1,5 +1,6 @@
 //! The command line: parses the arguments and calls the library.
 
+mod desktop;
 mod doctor;
 mod explain;
 mod export;
@@ -12,7 +13,7 @@ mod timeline;
 mod vendor;
 
 use clap::{Parser, Subcommand};
-use datasets::cli::{CommonArgs, CompletionsArgs, Status, run_main};
+use datasets::cli::{CommonArgs, CompletionsArgs, ManArgs, Status, run_main};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -50,8 +51,13 @@ enum Command {
     ServeRays(serve_rays::ServeRaysArgs),
     /// Draws when each phase of each frame ran
     Timeline(timeline::TimelineArgs),
+    /// Adds an entry to the desktop's menu that starts a program ray traced
+    InstallDesktop(desktop::DesktopArgs),
     /// Prints a completion script for a shell
     Completions(CompletionsArgs),
+    /// Writes the manual pages of the program and its subcommands into a folder
+    #[command(hide = true)]
+    Man(ManArgs),
 }
 
 /// Runs the program. Exit codes: 0 done, 1 failed, 2 wrong usage, 130 interrupted; with `run`, that
@@ -76,7 +82,9 @@ fn execute(cli: Cli, code: &mut Option<u8>) -> anyhow::Result<Status> {
         Command::Panel(args) => panel::panel(common, &args).map(Status::from),
         Command::ServeRays(args) => serve_rays::serve_rays(&common, &args).map(Status::from),
         Command::Timeline(args) => timeline::timeline(common, &args).map(Status::from),
+        Command::InstallDesktop(args) => desktop::install(&args, &common).map(Status::from),
         Command::Completions(args) => args.print::<Cli>().map(Status::from),
+        Command::Man(args) => args.write::<Cli>().map(Status::from),
     }
 }
 

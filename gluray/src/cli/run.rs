@@ -3,7 +3,7 @@
 use super::helpers::Helpers;
 use super::vendor::VendorFolder;
 use super::{last_report, library};
-use crate::host::config::environment::{OBJECTS, parse_pair, texts, variable_of};
+use crate::host::config::environment::{OBJECTS, ONLY_CHILD_OF, parse_pair, texts, variable_of};
 use crate::host::config::{Assignment, ConfigFile, SettingError, Settings, assign};
 use crate::host::report::Report;
 use anyhow::Context as _;
@@ -65,6 +65,10 @@ pub(super) struct RunArgs {
     /// Processes that trace one picture: the program, and N - 1 helpers that this starts and ends.
     #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..=256))]
     ranks: u32,
+    /// Trace the program itself, and none that it starts. A script that starts the program is not
+    /// the program.
+    #[arg(long)]
+    no_children: bool,
     /// How the library gets into the program.
     #[arg(long, value_enum, default_value = "auto")]
     via: Via,
@@ -219,6 +223,11 @@ pub(super) fn run(args: &RunArgs) -> anyhow::Result<u8> {
     let mut command = Command::new(&args.program[0]);
     command.args(&args.program[1..]).env("GLURAY_RUN_DIR", &reports);
     command.envs(variables);
+    if args.no_children {
+        command.env(ONLY_CHILD_OF, std::process::id().to_string());
+    } else {
+        command.env_remove(ONLY_CHILD_OF);
+    }
     if let Some(file) = &args.config {
         command.env("GLURAY_CONFIG", fs::canonicalize(file)?);
     }

@@ -12,7 +12,7 @@ mod sweep;
 mod units;
 
 use clap::{Parser, Subcommand};
-use datasets::cli::{CommonArgs, CompletionsArgs, run_main};
+use datasets::cli::{CommonArgs, CompletionsArgs, ManArgs, run_main};
 use std::process::ExitCode;
 
 /// Schlieren, shadowgraph, interferogram and background-oriented schlieren from flow data.
@@ -40,6 +40,9 @@ enum Command {
     Index(index::IndexArgs),
     /// Prints a completion script for a shell
     Completions(CompletionsArgs),
+    /// Writes the manual pages of the program and its subcommands into a folder
+    #[command(hide = true)]
+    Man(ManArgs),
 }
 
 /// Runs the program. Exit codes: 0 done, 1 failed, 2 wrong usage, 130 interrupted.
@@ -57,5 +60,6 @@ fn execute(cli: Cli) -> anyhow::Result<()> {
         Command::Serve(args) => serve::serve(common, &args),
         Command::Index(args) => index::index(common, &args),
         Command::Completions(args) => args.print::<Cli>(),
+        Command::Man(args) => args.write::<Cli>(),
     }
 }

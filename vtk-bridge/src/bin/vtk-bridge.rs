@@ -4,7 +4,7 @@
 
 use anyhow::Context;
 use clap::{Args, CommandFactory, Parser, Subcommand};
-use datasets::cli::{CommonArgs, CompletionsArgs, CureExt, Status, UsageError, run_main};
+use datasets::cli::{CommonArgs, CompletionsArgs, CureExt, ManArgs, Status, UsageError, run_main};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use vtk_bridge::options::NAMES;
@@ -45,6 +45,9 @@ enum Action {
     Options,
     /// Print a completion script for a shell.
     Completions(CompletionsArgs),
+    /// Writes the manual pages of the program and its subcommands into a folder.
+    #[command(hide = true)]
+    Man(ManArgs),
 }
 
 #[derive(Args)]
@@ -111,6 +114,7 @@ fn work() -> anyhow::Result<Status> {
             args.print::<Cli>()?;
             Ok(Status::Success)
         }
+        Action::Man(args) => args.write::<Cli>().map(Status::from),
     }
 }
 

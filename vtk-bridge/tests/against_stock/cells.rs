@@ -52,7 +52,7 @@ fn checked(flavour: &Flavour) -> String {
 
 #[test]
 fn cells_are_read_by_the_width_of_their_own_arrays_in_every_storage() {
-    let debian = peers::vtk91().map(|root| root.join("usr/include/vtk-9.1"));
+    let debian = peers::vtk91().and_then(|root| peers::vtk_headers(&root));
     let known: Vec<PathBuf> =
         debian.into_iter().chain(places(|name| std::env::var(name).ok())).collect();
     let (flavours, _) = find(&known);

@@ -4,7 +4,7 @@
 use crate::capture::{Capture, bright};
 use crate::compare::{Limits, faults};
 use crate::peers::{find, scripts, skip};
-use crate::session::{Launch, Program, With, installed, output};
+use crate::session::{Launch, Program, With, output, plugin_folder};
 
 /// Runs the script in ParaView's window and returns its images, or the reason why it cannot run
 /// here.
@@ -15,7 +15,7 @@ fn images() -> Result<[Capture; 4], String> {
     let _ = std::fs::remove_dir_all(&folder);
     std::fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
     // Like a user's list of plugins with "Auto Load" enabled.
-    let plugin = installed().join("plugins/pv5.11/VtkBridge.so");
+    let plugin = plugin_folder()?.join("VtkBridge.so");
     let list = folder.join("plugins.xml");
     let entry = format!(
         "<Plugins><Plugin name=\"VtkBridge\" filename=\"{}\" auto_load=\"1\"/></Plugins>",

@@ -19,12 +19,30 @@ pub(crate) fn skip(reason: &str) {
     let _ = writeln!(std::io::stderr(), "skipped: {reason}");
 }
 
-/// Debian's VTK 9.1, unpacked outside the system folders because it conflicts with ParaView's
-/// Python packages.
+/// Debian's VTK with its headers: on Debian 12 VTK 9.1, unpacked outside the system folders because
+/// it conflicts with ParaView's Python packages; `/` where it is installed.
 pub(crate) fn vtk91() -> Option<PathBuf> {
     let root = find("RTSV_VTK91", &[])
         .or_else(|| std::env::var_os("RTSV_PEERS").map(|p| PathBuf::from(p).join("vtk91")))?;
     root.join("usr/lib/python3/dist-packages/vtkmodules").is_dir().then_some(root)
+}
+
+/// The headers of the VTK in `root`, of whatever version.
+pub(crate) fn vtk_headers(root: &Path) -> Option<PathBuf> {
+    headers(&root.join("usr/include"), "vtk-")
+}
+
+/// The headers of Debian's ParaView with a VTK of its own, which the plugin is compiled with.
+pub(crate) fn paraview_headers() -> Option<PathBuf> {
+    headers(Path::new("/usr/include"), "paraview-")
+}
+
+/// The folder in `include` whose name starts with `prefix` and that has VTK's own headers.
+fn headers(include: &Path, prefix: &str) -> Option<PathBuf> {
+    let entries = std::fs::read_dir(include).ok()?.filter_map(|e| Some(e.ok()?.path()));
+    let named =
+        entries.filter(|p| p.file_name().is_some_and(|n| n.to_string_lossy().starts_with(prefix)));
+    named.filter(|p| p.join("vtkObjectFactory.h").is_file()).max()
 }
 
 /// ParaView's batch program.

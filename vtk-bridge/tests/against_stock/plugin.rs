@@ -4,15 +4,10 @@
 use crate::capture::{Capture, bright};
 use crate::compare::{Limits, faults};
 use crate::peers::{pvbatch, scripts, skip};
-use crate::session::{Launch, Program, Run, With, installed, interpreter, output};
-use std::path::PathBuf;
+use crate::session::{Launch, Program, Run, With, interpreter, output, plugin_folder};
 use std::sync::OnceLock;
 
 const SCRIPT: &str = "options";
-
-fn plugin_folder() -> PathBuf {
-    installed().join("plugins/pv5.11")
-}
 
 /// The script's images, rendered once.
 fn images() -> Option<&'static Run> {
@@ -22,7 +17,7 @@ fn images() -> Option<&'static Run> {
         let folder = output("plugin");
         let report = folder.join("report.json");
         let settings = [
-            ("PV_PLUGIN_PATH", plugin_folder().display().to_string()),
+            ("PV_PLUGIN_PATH", plugin_folder()?.display().to_string()),
             ("RTV_REPORT", report.display().to_string()),
         ];
         let settings: Vec<(&str, &str)> = settings.iter().map(|(n, v)| (*n, v.as_str())).collect();
@@ -137,8 +132,8 @@ fn a_plugin_without_its_bridge_says_so_and_harms_nothing() {
     }
     // The plugin alone in a folder: what it needs is not in a parent folder.
     let lonely = tempfile::tempdir().unwrap();
-    std::fs::copy(plugin_folder().join("VtkBridge.so"), lonely.path().join("VtkBridge.so"))
-        .unwrap();
+    let folder = plugin_folder().expect("built with ParaView's headers");
+    std::fs::copy(folder.join("VtkBridge.so"), lonely.path().join("VtkBridge.so")).unwrap();
     let folder = output("plugin-alone");
     std::fs::create_dir_all(&folder).unwrap();
     let line = format!("exec {} \"$@\"", interpreter(Program::ParaView, With::Stock).unwrap());

@@ -11,9 +11,9 @@ use std::sync::OnceLock;
 /// The program that runs a script.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Program {
-    /// Debian's VTK 9.1 in Python.
+    /// Debian's VTK in Python: 9.1 on Debian 12.
     Vtk,
-    /// Debian's ParaView 5.11, `pvbatch`.
+    /// Debian's ParaView, `pvbatch`: 5.11 on Debian 12.
     ParaView,
     /// The `vtk` wheel of PyPI.
     Wheel,
@@ -38,10 +38,10 @@ pub(crate) fn installed() -> &'static Path {
         let home = Path::new(env!("CARGO_TARGET_TMPDIR")).join("bridge");
         let mut install = Command::new(env!("CARGO_BIN_EXE_vtk-bridge"));
         install.args(["install", "--prefix"]).arg(&home);
-        if let Some(root) = peers::vtk91() {
-            install.arg("--include").arg(root.join("usr/include/vtk-9.1"));
+        if let Some(headers) = peers::vtk91().and_then(|root| peers::vtk_headers(&root)) {
+            install.arg("--include").arg(headers);
         }
-        if Path::new("/usr/include/paraview-5.11").is_dir() {
+        if peers::paraview_headers().is_some() {
             install.arg("--plugin");
         }
         let out = install.output().expect("vtk-bridge starts");
@@ -54,6 +54,15 @@ pub(crate) fn installed() -> &'static Path {
         );
         home
     })
+}
+
+/// The folder of ParaView's plugin, whatever ParaView's version; reasons for its absence.
+pub(crate) fn plugin_folder() -> Result<PathBuf, String> {
+    let folder = installed().join("plugins");
+    let none = || format!("no plugin in {}: no headers of ParaView are here", folder.display());
+    let entries = std::fs::read_dir(&folder).map_err(|_| none())?;
+    let mut folders = entries.filter_map(|e| Some(e.ok()?.path())).filter(|p| p.is_dir());
+    folders.next().ok_or_else(none)
 }
 
 /// A shell command in the environment of `program`.
@@ -102,7 +111,7 @@ impl Launch {
         }
         if program == Program::Vtk {
             let root = peers::vtk91()
-                .ok_or("Debian's VTK 9.1 was not found (set RTSV_VTK91 to where it is unpacked)")?;
+                .ok_or("Debian's VTK was not found (set RTSV_VTK91 to where it is unpacked)")?;
             let libraries = format!("usr/lib/{}-linux-gnu", std::env::consts::ARCH);
             command.env("LD_LIBRARY_PATH", root.join(libraries));
             command.env("PYTHONPATH", root.join("usr/lib/python3/dist-packages"));

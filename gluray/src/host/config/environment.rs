@@ -17,6 +17,10 @@ pub const OTHER_VARIABLES: &[(&str, &str)] = &[
     ("GLURAY_PANEL", "address of the control panel"),
     ("GLURAY_PANEL_SECRET", "its secret"),
     ("GLURAY_RUN_DIR", "folder that reports are written to"),
+    (
+        ONLY_CHILD_OF,
+        "process whose children are traced, and no others (`gluray run --no-children`)",
+    ),
     ("GLURAY_RANKS", "sockets of helpers that trace as well, with `:` between them"),
     ("GLURAY_LIBRARY", "the library that `gluray run` puts into programs"),
     (
@@ -25,6 +29,10 @@ pub const OTHER_VARIABLES: &[(&str, &str)] = &[
     ),
     ("GLURAY_EGL_VENDOR", "the same for EGL: names or libraries, with `:` between them"),
 ];
+
+/// The process whose children alone are traced. It is `gluray run`, whose child is the program;
+/// programs that the program starts have another parent.
+pub const ONLY_CHILD_OF: &str = "GLURAY_ONLY_CHILD_OF";
 
 /// Variables of others that say where things are.
 const PLACES: [&str; 6] =

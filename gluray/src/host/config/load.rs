@@ -17,6 +17,8 @@ pub struct Sources {
     pub program: Vec<String>,
     /// Environment variables.
     pub variables: Vec<(String, String)>,
+    /// The process that started this one.
+    pub parent: Option<u32>,
     /// What is wrong with variables that would have counted.
     pub refused: Vec<SettingError>,
 }
@@ -41,6 +43,7 @@ impl Sources {
         let executable = std::fs::read_link("/proc/self/exe").ok();
         Sources {
             refused,
+            parent: Some(std::os::unix::process::parent_id()),
             ..Sources::new(variables, program_names(executable.as_deref(), &arguments))
         }
     }
@@ -52,7 +55,15 @@ impl Sources {
         };
         let named = get("GLURAY_CONFIG").map(PathBuf::from);
         let file = named.clone().or_else(|| ConfigFile::usual_path(get));
-        Sources { file, file_is_required: named.is_some(), program, variables, refused: Vec::new() }
+        let file_is_required = named.is_some();
+        Sources { file, file_is_required, program, variables, ..Sources::default() }
+    }
+
+    /// True in programs that the program of `gluray run --no-children` started.
+    fn is_left_alone(&self) -> bool {
+        let wanted = self.variables.iter().find(|(n, _)| n == environment::ONLY_CHILD_OF);
+        let wanted = wanted.and_then(|(_, v)| v.parse().ok());
+        wanted.is_some_and(|wanted: u32| self.parent.is_some_and(|parent| parent != wanted))
     }
 
     /// Reads and puts together all layers below the panel's.
@@ -80,6 +91,7 @@ impl Sources {
         assignments.extend(variables);
         let (settings, errors) = assign(&Settings::default(), &assignments);
         loaded.settings = settings;
+        loaded.settings.enabled &= !self.is_left_alone();
         let errors = errors.iter().chain(&unknown).chain(&self.refused);
         loaded.problems.extend(errors.map(SettingError::to_string));
         loaded
@@ -201,5 +213,20 @@ mod tests {
             ["python3.11", "python3", "view", "view.py"]
         );
         assert_eq!(names("/usr/bin/octave-cli", &["octave", "x.m"]), ["octave-cli", "octave"]);
+    }
+
+    #[test]
+    fn programs_that_the_program_starts_are_left_alone_when_asked_for() {
+        let enabled = |variables: &[(&str, &str)], parent| {
+            let sources = Sources { parent, ..Sources::new(pairs(variables), vec!["gmsh".into()]) };
+            let loaded = sources.load();
+            assert_eq!(loaded.problems, Vec::<String>::new());
+            loaded.settings.enabled
+        };
+        let only = &[("GLURAY_ONLY_CHILD_OF", "7")];
+        assert!(enabled(only, Some(7)), "the program itself");
+        assert!(!enabled(only, Some(8)), "a program that it started");
+        assert!(enabled(&[], Some(8)) && enabled(only, None));
+        assert!(enabled(&[("GLURAY_ONLY_CHILD_OF", "")], Some(8)));
     }
 }

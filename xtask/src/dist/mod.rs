@@ -1,0 +1,254 @@
+//! `cargo xtask dist`: a tarball and a Debian package of the programs, for machines without Rust.
+//!
+//! ```text
+//! TREE/bin          the programs                          (deb: links in /usr/bin)
+//! TREE/lib          libgluray.so and libvtk_bridge.so     (the programs look in ../lib)
+//! TREE/python       rtvtk, for the wheel of VTK           (deb: a link in Python's folder)
+//! TREE/include      rtv.h, the C interface of vtk-bridge
+//! TREE/share        manual pages, completions, licences   (deb: in /usr/share)
+//! ```
+//!
+//! In the Debian package the tree lies in `/usr/lib/rtsv`. A tarball works in any folder.
+//!
+//! The package is written by hand and not by cargo-deb: cargo-deb packs one member and has its
+//! metadata in that member's manifest, while this is one package of eight members; it would have to
+//! be built from 150 crates first; and `dpkg-deb` is on every Debian. What cargo-deb would find by
+//! itself, the packages that are depended on, is [`depends`].
+
+mod completions;
+mod debian;
+mod depends;
+mod notices;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+/// The programs, and the member that builds each.
+const PROGRAMS: &[&str] = &["gluray", "schlieren", "composite", "vtk-bridge", "datasets", "bench"];
+
+/// The shared libraries, built by members `gluray-interposer` and `vtk-bridge`.
+const LIBRARIES: &[&str] = &["libgluray.so", "libvtk_bridge.so"];
+
+/// The members with something to ship.
+const MEMBERS: &[&str] =
+    &["gluray", "gluray-interposer", "schlieren", "composite", "vtk-bridge", "datasets", "bench"];
+
+/// The shells with completions: name for the program's subcommand, folder below `share`, and what
+/// goes before and behind the program's name.
+const SHELLS: &[(&str, &str, &str, &str)] = &[
+    ("bash", "bash-completion/completions", "", ""),
+    ("zsh", "zsh/vendor-completions", "_", ""),
+    ("fish", "fish/vendor_completions.d", "", ".fish"),
+];
+
+/// Options of `cargo xtask dist`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct DistOptions {
+    /// Cargo's profile.
+    pub(crate) profile: String,
+    /// Folder for the packages; `None` is `dist` in the build folder.
+    pub(crate) out: Option<PathBuf>,
+}
+
+impl DistOptions {
+    /// Reads the options from the words behind `dist`.
+    pub(crate) fn parse(words: &[String]) -> Result<DistOptions, String> {
+        let mut options = DistOptions { profile: "release".to_owned(), out: None };
+        let mut words = words.iter();
+        while let Some(word) = words.next() {
+            let mut value = |example: &str| {
+                words.next().cloned().ok_or(format!("`{word}` needs a value, as in `{example}`"))
+            };
+            match word.as_str() {
+                "--profile" => options.profile = value("--profile dev")?,
+                "--out" => options.out = Some(value("--out /tmp/packages")?.into()),
+                other => {
+                    return Err(format!("`dist` does not know `{other}`; see `cargo xtask help`"));
+                }
+            }
+        }
+        Ok(options)
+    }
+}
+
+/// Builds, packs, and prints the packages and their sizes.
+pub(crate) fn run(root: &Path, build: &Path, options: &DistOptions) -> Result<(), String> {
+    if cfg!(not(all(target_arch = "x86_64", target_os = "linux"))) {
+        return Err("packages are made on x86-64 Linux, where gluray runs".to_owned());
+    }
+    let read = |path: &str| read(&root.join(path));
+    let version = version(&read("Cargo.toml")?).ok_or("Cargo.toml: there is no version")?;
+    let mut cargo = vec!["build", "--profile", &options.profile];
+    MEMBERS.iter().for_each(|m| cargo.extend(["-p", m]));
+    let program = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    run_in(root, program, &cargo)?;
+
+    // The profile `dev` builds in `debug`, for historical reasons.
+    let built = build.join(if options.profile == "dev" { "debug" } else { &options.profile });
+    let out = options.out.clone().unwrap_or_else(|| build.join("dist"));
+    let out = std::path::absolute(&out).map_err(|e| format!("{}: {e}", out.display()))?;
+    let name = format!("rtsv-{version}-x86_64-linux");
+    let tree = out.join(&name);
+    if tree.exists() {
+        fs::remove_dir_all(&tree).map_err(|e| format!("{}: {e}", tree.display()))?;
+    }
+    fill(root, &built, &tree)?;
+
+    let tarball = format!("{name}.tar.gz");
+    let mut tar = vec!["--sort=name", "--owner=0", "--group=0", "--numeric-owner"];
+    tar.extend(["-czf", &tarball, &name]);
+    run_in(&out, "tar", &tar)?;
+    let package = debian::pack(&tree, &out, &version)?;
+    for file in [out.join(tarball), package] {
+        let bytes = fs::metadata(&file).map_err(|e| format!("{}: {e}", file.display()))?.len();
+        println!("{} ({:.1} MB)", file.display(), bytes as f64 / 1e6);
+    }
+    Ok(())
+}
+
+/// Fills the tree from what was built.
+fn fill(root: &Path, built: &Path, tree: &Path) -> Result<(), String> {
+    let [bin, lib] = ["bin", "lib"].map(|d| tree.join(d));
+    for program in PROGRAMS {
+        copy(&built.join(program), &bin.join(program))?;
+        run_in(tree, "strip", &[&format!("bin/{program}")])?;
+    }
+    for library in LIBRARIES {
+        copy(&built.join(library), &lib.join(library))?;
+        // What programs look up by name stays.
+        run_in(tree, "strip", &["--strip-unneeded", &format!("lib/{library}")])?;
+    }
+    copy(&root.join("vtk-bridge/include/rtv.h"), &tree.join("include/rtv.h"))?;
+    let package = root.join("vtk-bridge/python/rtvtk");
+    for file in files_with(&package, ".py")? {
+        copy(&package.join(&file), &tree.join("python/rtvtk").join(&file))?;
+    }
+    link("../../lib/libvtk_bridge.so", &tree.join("python/rtvtk/libvtk_bridge.so"))?;
+
+    let manual = tree.join("share/man/man1");
+    make(&manual)?;
+    for program in PROGRAMS {
+        let path = bin.join(program).display().to_string();
+        run_in(tree, &path, &["man", &manual.display().to_string()])?;
+        for (shell, folder, before, behind) in SHELLS {
+            let script = output_of(&path, &["completions", shell])?;
+            let file = tree.join("share").join(folder).join(format!("{before}{program}{behind}"));
+            write(&file, &script)?;
+        }
+    }
+    let documents = tree.join("share/doc/rtsv");
+    for file in ["README.md", "CHANGELOG.md", "LICENSE-MIT", "LICENSE-APACHE"] {
+        copy(&root.join(file), &documents.join(file))?;
+    }
+    write(&documents.join("THIRD-PARTY.txt"), &notices::of(root, MEMBERS)?)
+}
+
+/// The version in `[workspace.package]`.
+fn version(manifest: &str) -> Option<String> {
+    let section = manifest.split_once("[workspace.package]")?.1;
+    let line = section.lines().find_map(|l| l.strip_prefix("version = \""))?;
+    Some(line.trim_end_matches('"').to_owned())
+}
+
+// ---- Files --------------------------------------------------------------------------------------
+fn read(path: &Path) -> Result<String, String> {
+    fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))
+}
+
+fn make(folder: &Path) -> Result<(), String> {
+    fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))
+}
+
+fn write(path: &Path, text: &str) -> Result<(), String> {
+    make(path.parent().unwrap_or(Path::new(".")))?;
+    fs::write(path, text).map_err(|e| format!("{}: {e}", path.display()))
+}
+
+fn copy(from: &Path, to: &Path) -> Result<(), String> {
+    make(to.parent().unwrap_or(Path::new(".")))?;
+    let copied = fs::copy(from, to).map(drop);
+    copied.map_err(|e| format!("{} cannot become {}: {e}", from.display(), to.display()))
+}
+
+/// A symbolic link at `at` to `target`, which is relative to the folder of the link.
+fn link(target: &str, at: &Path) -> Result<(), String> {
+    make(at.parent().unwrap_or(Path::new(".")))?;
+    let _ = fs::remove_file(at);
+    std::os::unix::fs::symlink(target, at).map_err(|e| format!("{}: {e}", at.display()))
+}
+
+/// The names of the files in `folder` that end in `ending`, sorted.
+fn files_with(folder: &Path, ending: &str) -> Result<Vec<String>, String> {
+    let entries = fs::read_dir(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+    let names = entries.filter_map(|e| e.ok()?.file_name().into_string().ok());
+    let mut names: Vec<String> = names.filter(|n| n.ends_with(ending)).collect();
+    names.sort();
+    Ok(names)
+}
+
+// ---- Programs -----------------------------------------------------------------------------------
+/// Runs a program in `folder`; an error when it does not end with 0.
+fn run_in(
+    folder: &Path,
+    program: impl AsRef<std::ffi::OsStr>,
+    args: &[&str],
+) -> Result<(), String> {
+    let program = program.as_ref();
+    let shown = format!("{} {}", program.to_string_lossy(), args.join(" "));
+    println!("==> {shown}");
+    match Command::new(program).args(args).current_dir(folder).stdin(Stdio::null()).status() {
+        Ok(status) if status.success() => Ok(()),
+        Ok(status) => Err(format!("`{shown}`: {status}")),
+        Err(e) => Err(format!("`{shown}` does not start: {e}")),
+    }
+}
+
+/// What a program prints; an error when it does not end with 0.
+fn output_of(program: impl AsRef<std::ffi::OsStr>, args: &[&str]) -> Result<String, String> {
+    let program = program.as_ref();
+    let shown = format!("{} {}", program.to_string_lossy(), args.join(" "));
+    let output = Command::new(program).args(args).stdin(Stdio::null()).output();
+    let output = output.map_err(|e| format!("`{shown}` does not start: {e}"))?;
+    if !output.status.success() {
+        let errors = String::from_utf8_lossy(&output.stderr);
+        return Err(format!("`{shown}`: {}\n{errors}", output.status));
+    }
+    String::from_utf8(output.stdout).map_err(|e| format!("`{shown}`: {e}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parsed(line: &str) -> Result<DistOptions, String> {
+        DistOptions::parse(&line.split_whitespace().map(str::to_owned).collect::<Vec<_>>())
+    }
+
+    #[test]
+    fn options_of_dist_are_read_and_wrong_ones_refused() {
+        let release = DistOptions { profile: "release".to_owned(), out: None };
+        assert_eq!(parsed(""), Ok(release));
+        let other = DistOptions { profile: "dev".to_owned(), out: Some("/x".into()) };
+        assert_eq!(parsed("--profile dev --out /x"), Ok(other));
+        for wrong in ["--profile", "--out", "now"] {
+            assert!(parsed(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn the_version_is_that_of_the_workspace() {
+        let manifest = read(&crate::workspace_root().join("Cargo.toml")).expect("a manifest");
+        let version = version(&manifest).expect("a version");
+        assert!(version.split('.').count() == 3, "{version}");
+    }
+
+    #[test]
+    fn what_is_packed_is_what_members_build() {
+        for member in MEMBERS.iter().filter(|m| **m != "gluray-interposer") {
+            assert!(PROGRAMS.contains(member), "{member} builds no program that is shipped");
+            let folder = crate::workspace_root().join(member);
+            assert!(folder.join("Cargo.toml").is_file(), "{member}");
+        }
+    }
+}
