@@ -34,7 +34,7 @@ impl Mode {
 /// A built world.
 pub struct RtCoreTracer {
     /// The world.
-    pub world: World,
+    pub world: Arc<World>,
     options: BuildOptions,
     /// Cost of the build; the peak is the growth of the heap, without the mesh.
     pub cost: BuildCost,
@@ -68,7 +68,7 @@ impl RtCoreTracer {
         };
         let origin = meshes.first().map_or(world.origin(), |m| m.origin);
         let shift = (origin - world.origin()).as_vec3();
-        Ok(RtCoreTracer { world, options: *options, cost, shift })
+        Ok(RtCoreTracer { world: Arc::new(world), options: *options, cost, shift })
     }
 
     /// A view that sends rays through one entry point.
@@ -116,7 +116,7 @@ impl Tracer for View<'_> {
     }
 
     fn closest(&self, rays: &[RayBlock], hits: &mut [HitBlock]) {
-        let world = &self.ours.world;
+        let world = &*self.ours.world;
         self.shifted(rays, |rays| match self.mode {
             Mode::Coherent => world.closest_coherent(rays, hits).expect(ONE_EACH),
             Mode::Incoherent => world.closest_incoherent(rays, hits).expect(ONE_EACH),
@@ -131,7 +131,7 @@ impl Tracer for View<'_> {
     }
 
     fn occluded(&self, rays: &[RayBlock], masks: &mut [u16]) {
-        let world = &self.ours.world;
+        let world = &*self.ours.world;
         self.shifted(rays, |rays| match self.mode {
             Mode::Coherent => world.occluded_coherent(rays, masks).expect(ONE_EACH),
             Mode::Incoherent => world.occluded_incoherent(rays, masks).expect(ONE_EACH),

@@ -24,8 +24,10 @@ mod fig5_11;
 mod fig5_12;
 mod fig5_13;
 mod fig5_14;
+mod frames;
 mod image_error;
 mod installed_tracers;
+mod many_meshes;
 mod many_ranks;
 mod paraview;
 mod partition_view;
@@ -200,6 +202,18 @@ pub const ALL: &[Experiment] = &[
         chapter: 4,
         title: "Rays per second, builds and memory against Embree 3, Embree 4 and obvhs",
         run: baselines::run,
+    },
+    Experiment {
+        id: "many-meshes",
+        chapter: 4,
+        title: "Thousands of small meshes: rays and builds against one mesh and against Embree",
+        run: many_meshes::run,
+    },
+    Experiment {
+        id: "frames",
+        chapter: 4,
+        title: "What a whole frame costs beyond the rays it sends",
+        run: frames::run,
     },
     Experiment {
         id: "pictures",

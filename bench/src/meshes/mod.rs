@@ -6,12 +6,14 @@ mod cells;
 mod city;
 mod forest;
 mod scene;
+mod spheres;
 
 pub use anisotropic::{slivers, terrain};
 pub use cells::cells;
 pub use city::city;
 pub use forest::forest;
 pub use scene::MeshScene;
+pub use spheres::spheres;
 
 use anyhow::Context as _;
 use datasets::generate::nested_wavelet::Size;

@@ -1,6 +1,6 @@
 //! What the tracers are compared on: meshes, and where they stand.
 
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DVec3, Vec3};
 use rt_core::bvh::Instance;
 use rt_core::math::Aabb;
 use rt_core::mesh::TriMesh;
@@ -27,6 +27,19 @@ impl MeshScene {
     pub fn many(name: &str, meshes: Vec<Arc<TriMesh>>) -> MeshScene {
         let instances = (0..meshes.len()).map(unmoved).collect();
         MeshScene { name: name.into(), meshes, instances }
+    }
+
+    /// The same triangles in one mesh, in the order of the instances. Without normals and colours.
+    pub fn merged(&self) -> MeshScene {
+        let mut all = TriMesh::default();
+        for i in &self.instances {
+            let (mesh, first) = (&self.meshes[i.geometry], all.positions.len() as u32);
+            let place = |p: &Vec3| i.world_from_object.transform_point3(p.as_dvec3()).as_vec3();
+            all.positions.extend(mesh.positions.iter().map(place));
+            all.indices.extend(mesh.indices.iter().map(|t| t.map(|corner| corner + first)));
+        }
+        all.origin = self.meshes.first().map_or(DVec3::ZERO, |m| m.origin);
+        MeshScene::one(&self.name, Arc::new(all))
     }
 
     /// The mesh of a scene that is one mesh.
@@ -65,4 +78,27 @@ impl MeshScene {
 
 fn unmoved(geometry: usize) -> Instance {
     Instance { geometry, world_from_object: DAffine3::IDENTITY }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::meshes;
+
+    #[test]
+    fn a_merged_scene_has_the_corners_of_its_parts() {
+        for scene in [meshes::city(5), meshes::forest(7)] {
+            let merged = scene.merged();
+            let whole = merged.only_mesh().expect("one mesh");
+            assert_eq!(whole.num_triangles(), scene.num_triangles());
+            let mut triangle = 0;
+            for (i, place) in scene.instances.iter().enumerate() {
+                for prim in 0..scene.meshes[place.geometry].num_triangles() {
+                    let part = scene.corners(i as u32, prim as u32).map(|p| p.as_vec3());
+                    assert_eq!(whole.triangle(triangle), part, "{}: {triangle}", scene.name);
+                    triangle += 1;
+                }
+            }
+        }
+    }
 }

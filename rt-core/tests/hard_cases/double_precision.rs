@@ -128,6 +128,51 @@ fn compare(mesh: &MeshF64, options: &BuildOptions, rays: &[RayF64], what: &str) 
     (hits, worst)
 }
 
+/// Rays in groups of sixteen with origins close together, as those of ambient occlusion: half of
+/// them at points of the mesh, half in any direction. `size` is about the mesh's.
+fn rays_from_common_places(mesh: &MeshF64, groups: usize, size: f64, seed: u64) -> Vec<RayF64> {
+    let mut r = SplitMix64::new(seed);
+    let mut rays = Vec::with_capacity(16 * groups);
+    for group in 0..groups {
+        let away = size * 10f64.powf(-6.0 + 5.0 * r.unit());
+        let place = target(mesh, &mut r) + r.direction() * away;
+        for lane in 0..16 {
+            // In every third group all rays start at the same point.
+            let apart = if group % 3 == 0 { 0.0 } else { 0.01 * away };
+            let origin = place + r.direction() * apart;
+            let direction = match lane % 2 {
+                0 => (target(mesh, &mut r) - origin) * (0.5 + r.unit()),
+                _ => r.direction() * size,
+            };
+            let ray = RayF64::new(origin, direction);
+            rays.push(match lane % 5 {
+                1 => ray.with_t_max(r.unit()),
+                2 => RayF64 { t_min: 0.1 * r.unit(), ..ray },
+                _ => ray,
+            });
+        }
+    }
+    rays
+}
+
+#[test]
+fn f64_rays_that_start_close_together_have_exact_hits() {
+    let sphere = icosphere(2);
+    let sphere = MeshF64::new(sphere.0, sphere.1);
+    let cases = [
+        ("soup", soup(150, 23), 1.0),
+        ("terrain in a UTM zone", ground(9, 1e3, UTM, 29), 1e4),
+        ("a closed sphere", moved(&sphere, |p| UTM * 1e-3 + p * 0.01), 0.01),
+    ];
+    for (i, (name, mesh, size)) in cases.iter().enumerate() {
+        let rays = rays_from_common_places(mesh, 12, *size, i as u64);
+        for options in some_options() {
+            let (hits, _) = compare(mesh, &options, &rays, name);
+            assert!(hits > 60, "{name}: only {hits} hits");
+        }
+    }
+}
+
 #[test]
 fn f64_far_from_the_origin() {
     let micrometres = icosphere(1);
