@@ -225,7 +225,7 @@ impl BridgeState {
         if self.bridge.options().need_rays() || f.shadows != 0 || report::ranks() > 1 {
             return RTV_CHOICE_RAYS;
         }
-        let facts = (f.known != 0).then(|| SceneFacts {
+        let facts = (f.known != 0).then_some(SceneFacts {
             pixels: f.pixels,
             props: f.props,
             triangles: f.triangles,
