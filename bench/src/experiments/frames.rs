@@ -2,7 +2,7 @@
 //! that picture are traced without shading, in turns on one thread.
 
 use super::Context;
-use super::compare::{self, Kind};
+use super::compare::Kind;
 use crate::baselines::{Tracer, closest_all, count_hits, count_occluded, occluded_all};
 use crate::clock::Clock;
 use crate::meshes::{self, MeshScene};
@@ -12,7 +12,6 @@ use crate::record::{Record, Row};
 use crate::rt_core_tracer::{Mode, RtCoreTracer};
 use crate::runner::{Ratio, Schedule, Timings, Variant, interleave};
 use datasets::generate::nested_wavelet::Size;
-use glam::DVec3;
 use rayon::ThreadPoolBuilder;
 use rt_core::camera::Camera;
 use rt_core::light::Light;
@@ -116,9 +115,9 @@ fn measure(
         .map(|kind| ours.view(if kind.coherent() { Mode::Coherent } else { Mode::Incoherent }));
     let sets = rays_of_the_frame(scene, &tracers[0], view, pixels);
     let frames = Frames::new(ours, view, pixels)?;
+    let buffers = sets.each_ref().map(Answers::of);
     let timings = {
         let mut variants: Vec<Variant<'_>> = vec![];
-        let buffers: Vec<_> = sets.iter().map(Answers::of).collect();
         for (((kind, set), tracer), buffer) in KINDS.iter().zip(&sets).zip(&tracers).zip(&buffers) {
             let pool = &pool;
             let run = move || pool.install(|| buffer.trace(*kind, tracer, set));

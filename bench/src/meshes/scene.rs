@@ -82,7 +82,6 @@ fn unmoved(geometry: usize) -> Instance {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::meshes;
 
     #[test]
