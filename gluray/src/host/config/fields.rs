@@ -97,9 +97,8 @@ pub const FIELDS: &[Field] = &[
     field(
         "always_trace",
         Kind::Switch,
-        "rays also where the driver draws the same picture for less",
-    )
-    .only_in(&["match"]),
+        "rays also where the driver draws the same picture for less, as all modes but match do",
+    ),
     field(
         "samples",
         Kind::Whole { low: 1, high: 4096 },

@@ -1,6 +1,6 @@
-//! Lights triangles at other points of the image than those through which they were hit: rasterizers
-//! find out for each of a pixel's samples what covers it, but light a triangle once per pixel, at the
-//! pixel's centre, in its plane also beyond its sides.
+//! Lights triangles at other points of the image than those through which they were hit:
+//! rasterizers find out for each of a pixel's samples what covers it, but light a triangle once per
+//! pixel, at the pixel's centre, in its plane also beyond its sides.
 
 use super::super::frame_context::FrameContext;
 use super::super::tile::TileArea;
