@@ -11,7 +11,7 @@ use crate::record::{Record, Row};
 use crate::runner::{Schedule, Variant, interleave};
 use anyhow::ensure;
 use datasets::model::{Attributes, Cells, Dataset, Points, UnstructuredGrid};
-use datasets::resample::{Lattice, Mesh, Options, Resolution, Samples, resample};
+use datasets::resample::{Lattice, Mesh, Options, Reconstruction, Resolution, Samples, resample};
 use glam::DVec3;
 use rt_core::math::SplitMix64;
 use schlieren::field::Field;
@@ -27,6 +27,10 @@ const AMPLITUDE: f64 = 1e-5;
 /// The row of lattices that are sampled from the closed form, without a mesh.
 const NO_MESH: &str = "none";
 
+/// The ways to compute the value of a node, with its samples per axis.
+const WAYS: [(Reconstruction, usize); 3] =
+    [(Reconstruction::Cubic, 1), (Reconstruction::Linear, 1), (Reconstruction::Linear, 2)];
+
 /// VTK's number of a tetrahedron.
 const VTK_TETRA: u8 = 10;
 
@@ -35,6 +39,7 @@ struct Case<'a> {
     /// Points per axis of the mesh; `None` for the closed form.
     mesh: Option<(usize, &'a Mesh, &'a [f64])>,
     lattice: Lattice,
+    reconstruction: Reconstruction,
     samples_per_axis: usize,
     auto: bool,
 }
@@ -54,7 +59,8 @@ impl Case<'_> {
             return Ok((blob(AMPLITUDE, self.nodes())?.1, None));
         };
         let Lattice { dims, origin, spacing } = self.lattice;
-        let options = Options { samples_per_axis: self.samples_per_axis };
+        let Case { samples_per_axis, reconstruction, .. } = *self;
+        let options = Options { samples_per_axis, reconstruction };
         let on = resample(mesh, Samples::Points(values), &self.lattice, &options)?;
         ensure!(
             on.report.inside == self.lattice.len(),
@@ -70,6 +76,7 @@ impl Case<'_> {
 fn explain_columns(record: &mut Record) {
     record.column("mesh", "", "points of the mesh of tetrahedra; `none` for the closed form");
     record.column("cells", "", "tetrahedra");
+    record.column("reconstruction", "", "how values between the points of the mesh are computed");
     record.column("samples_per_axis", "", "samples per axis and node of the lattice");
     record.column("nodes", "", "nodes per axis of the lattice");
     record.column("auto", "", "whether this is the lattice of the default resolution");
@@ -120,7 +127,8 @@ fn compare(
     let mut cases: Vec<Case<'_>> = vec![];
     for &n in lattices {
         let lattice = fit(1.0, Resolution::Longest(n))?;
-        cases.push(Case { mesh: None, lattice, samples_per_axis: 1, auto: false });
+        let reconstruction = Reconstruction::default();
+        cases.push(Case { mesh: None, lattice, reconstruction, samples_per_axis: 1, auto: false });
     }
     for (points, mesh, values) in &made {
         let mesh_of = Some((*points, mesh, values.as_slice()));
@@ -133,9 +141,9 @@ fn compare(
             }
         }
         all.sort_by_key(|l| l.0.dims);
-        for samples_per_axis in [1, 2] {
+        for (reconstruction, samples_per_axis) in WAYS {
             for &(lattice, auto) in &all {
-                cases.push(Case { mesh: mesh_of, lattice, samples_per_axis, auto });
+                cases.push(Case { mesh: mesh_of, lattice, reconstruction, samples_per_axis, auto });
             }
         }
     }
@@ -193,6 +201,7 @@ fn compare(
             Row::new()
                 .with("mesh", case.mesh_name())
                 .with("cells", case.mesh.map(|m| m.1.num_cells()))
+                .with("reconstruction", case.reconstruction.name())
                 .with("samples_per_axis", case.samples_per_axis)
                 .with("nodes", case.nodes())
                 .with("auto", if case.auto { "yes" } else { "no" })
@@ -240,9 +249,11 @@ fn plots(record: &mut Record) {
         Axis::log("rms error of the deflection", "rad"),
     );
     for mesh in mesh_names(&record.rows) {
-        for samples in [1.0, 2.0] {
+        for (reconstruction, samples) in WAYS {
             let of = |r: &&Row| {
-                r.text("mesh") == Some(mesh) && r.number("samples_per_axis") == Some(samples)
+                r.text("mesh") == Some(mesh)
+                    && r.text("reconstruction") == Some(reconstruction.name())
+                    && r.number("samples_per_axis") == Some(samples as f64)
             };
             let points = |x: &str| -> Vec<(f64, f64)> {
                 let rows = record.rows.iter().filter(of);
@@ -250,8 +261,11 @@ fn plots(record: &mut Record) {
             };
             let name = match (mesh, samples) {
                 (NO_MESH, _) => "closed form".to_owned(),
-                (mesh, 1.0) => format!("mesh of {mesh} points"),
-                (mesh, _) => format!("mesh of {mesh} points, {samples}³ samples per node"),
+                (mesh, 1) => format!("mesh of {mesh} points, {}", reconstruction.name()),
+                (mesh, _) => format!(
+                    "mesh of {mesh} points, {}, {samples}³ samples per node",
+                    reconstruction.name()
+                ),
             };
             for (plot, x) in [(&mut by_nodes, "nodes"), (&mut by_time, "time")] {
                 let points = points(x);
@@ -271,7 +285,8 @@ fn describe(rows: &[Row]) -> String {
         .filter(|m| *m != NO_MESH)
         .filter_map(|mesh| {
             let of = |r: &&Row| {
-                r.text("mesh") == Some(mesh) && r.number("samples_per_axis") == Some(1.0)
+                let cubic = Some(Reconstruction::Cubic.name());
+                r.text("mesh") == Some(mesh) && r.text("reconstruction") == cubic
             };
             let auto = rows.iter().filter(of).find(|r| r.text("auto") == Some("yes"))?;
             let error = |r: &Row| r.number("relative_error");
@@ -390,24 +405,27 @@ mod tests {
         let mut progress = |_: &str, _: Option<f64>| Ok(());
         let mut context = Context::new(true, None, &mut progress);
         compare(&mut context, &mut record, &[17, 25], &[13, 33]).unwrap();
-        let error = |mesh: &str, nodes: f64| {
+        let by = |reconstruction: &str, mesh: &str, nodes: f64| {
             let of = |r: &&Row| {
                 r.text("mesh") == Some(mesh)
+                    && r.text("reconstruction") == Some(reconstruction)
                     && r.number("nodes") == Some(nodes)
                     && r.number("samples_per_axis") == Some(1.0)
             };
             record.rows.iter().find(of).and_then(|r| r.number("relative_error")).unwrap()
         };
+        let error = |mesh: &str, nodes: f64| by("cubic", mesh, nodes);
         assert!(error(NO_MESH, 33.0) < 0.1 * error(NO_MESH, 13.0));
         for mesh in ["17³", "25³"] {
             assert!(error(mesh, 33.0) < error(mesh, 13.0), "{mesh}");
+            assert!(error(mesh, 33.0) < 0.7 * by("linear", mesh, 33.0), "{mesh}");
         }
         // The lattice of 33 nodes resolves the blob better than either mesh, and the finer mesh
         // better than the coarser one.
         assert!(error(NO_MESH, 33.0) < 0.3 * error("25³", 33.0));
         assert!(error("25³", 33.0) < error("17³", 33.0));
         let autos = record.rows.iter().filter(|r| r.text("auto") == Some("yes")).count();
-        assert_eq!(autos, 4, "one for each mesh and number of samples");
+        assert_eq!(autos, 6, "one for each mesh and way");
         assert!(record.notes.iter().any(|n| n.contains("mesh of 25³ points: ")));
         assert!(record.unexplained_columns().is_empty());
     }

@@ -2,27 +2,31 @@
 //! hexahedra, wedges, pyramids, prisms, polyhedra, and collections of them.
 //!
 //! For each cell, the lattice nodes inside it are determined (`rasterize`). No search tree is
-//! needed, and the time is proportional to the number of nodes plus the number of cells. Inside a
-//! cell, values are those of the finite element (`shape`): Newton's method inverts the trilinear
-//! map of a hexahedron. Cells whose map cannot be inverted are divided into tetrahedra and counted.
+//! needed, and the time is proportional to the number of nodes plus the number of cells. Newton's
+//! method inverts the trilinear map of a hexahedron (`shape`); cells whose map cannot be inverted
+//! are divided into tetrahedra and counted. Between the points of the mesh, values are those of
+//! polynomials fitted to the values around ([`Reconstruction`]).
 //!
 //! [`Mark`] classifies a node. [`Report`] measures the loss of accuracy by sampling the lattice
 //! back at the points of the mesh.
 
 mod mesh;
 mod rasterize;
+mod reconstruct;
 mod report;
 mod revolve;
 mod shape;
 mod smooth;
 
 pub use mesh::{Mesh, Plane};
+pub use reconstruct::{FitQuality, Reconstruction};
 pub use report::{Report, ResamplingError};
 pub use revolve::{revolve, revolved_bounds};
 pub use smooth::smooth;
 
 use crate::model::ModelError;
 use glam::DVec3;
+use reconstruct::PointField;
 
 /// Why a data set cannot be resampled.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -194,7 +198,8 @@ pub enum Mark {
 pub enum Samples<'a> {
     /// One per point.
     Points(&'a [f64]),
-    /// One per cell. Points get the mean of their cells, as in `vtkCellDataToPointData`.
+    /// One per cell, its average over the cell. [`Reconstruction::Linear`] gives points the mean of
+    /// their cells, as `vtkCellDataToPointData` does.
     Cells(&'a [f64]),
 }
 
@@ -204,11 +209,13 @@ pub struct Options {
     /// A node gets the mean over this many samples per axis of the box around it. 1 takes the value
     /// at the node; 2 or more also average features finer than the lattice, such as shocks.
     pub samples_per_axis: usize,
+    /// How values between the points of the mesh are computed.
+    pub reconstruction: Reconstruction,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Options { samples_per_axis: 1 }
+        Options { samples_per_axis: 1, reconstruction: Reconstruction::default() }
     }
 }
 
@@ -281,10 +288,16 @@ pub fn resample(
             (averaged.as_slice(), Some(v))
         }
     };
+    let field = match (options.reconstruction, cells) {
+        (Reconstruction::Linear, _) => PointField::linear(points),
+        (Reconstruction::Cubic, None) => PointField::of_points(mesh, points),
+        (Reconstruction::Cubic, Some(cells)) => PointField::of_cells(mesh, cells, points),
+    };
     let (values, marks, counts) =
-        rasterize::rasterize(mesh, points, cells, lattice, options.samples_per_axis);
+        rasterize::rasterize(mesh, &field, cells, lattice, options.samples_per_axis);
     let resampling_error = report::resampling_error(mesh, samples, lattice, &values);
-    let report = Report::new(mesh, &marks, counts, resampling_error);
+    let fit = field.quality(mesh);
+    let report = Report { fit, ..Report::new(mesh, &marks, counts, resampling_error) };
     Ok(ResampledField { lattice: *lattice, values, marks, report })
 }
 

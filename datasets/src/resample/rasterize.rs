@@ -6,6 +6,7 @@
 //! because curved faces of different cell types do not match exactly.
 
 use super::mesh::Mesh;
+use super::reconstruct::PointField;
 use super::shape::Cell;
 use super::{Lattice, Mark};
 use glam::DVec3;
@@ -87,7 +88,7 @@ impl FineLattice<'_> {
 /// Values and marks of all nodes.
 pub(super) fn rasterize(
     mesh: &Mesh,
-    of_points: &[f64],
+    field: &PointField<'_>,
     of_cells: Option<&[f64]>,
     lattice: &Lattice,
     samples_per_axis: usize,
@@ -140,7 +141,7 @@ pub(super) fn rasterize(
             let mut scratch = Scratch::default();
             for &cell in &cells[starts[k]..starts[k + 1]] {
                 let cell = cell as usize;
-                let data = CellData { mesh, of_points, of_cells, cell };
+                let data = CellData { mesh, field, of_cells, cell };
                 let (hit, fold) = data.visit(&fine, k, &mut samples, &mut scratch);
                 if hit {
                     seen[cell].store(true, Ordering::Relaxed);
@@ -184,13 +185,13 @@ fn cell_box(mesh: &Mesh, cell: usize) -> Option<(DVec3, DVec3)> {
 #[derive(Default)]
 struct Scratch {
     points: Vec<DVec3>,
-    values: Vec<f64>,
+    weights: Vec<f64>,
 }
 
 /// A cell with its values and mark.
 struct CellData<'a> {
     mesh: &'a Mesh,
-    of_points: &'a [f64],
+    field: &'a PointField<'a>,
     of_cells: Option<&'a [f64]>,
     cell: usize,
 }
@@ -215,9 +216,7 @@ impl CellData<'_> {
         let corners = self.mesh.corners(self.cell);
         scratch.points.clear();
         scratch.points.extend(corners.ids.iter().map(|&i| self.mesh.point(i as usize)));
-        scratch.values.clear();
-        scratch.values.extend(corners.ids.iter().map(|&i| self.of_points[i as usize]));
-        let shape = Cell::new(&scratch.points, &scratch.values, &corners.shape);
+        let shape = Cell::new(&scratch.points, &corners.shape);
         let own_mark = if self.mesh.is_hidden(self.cell) {
             Mark::Hidden
         } else if self.of_cells.is_some_and(|v| !v[self.cell].is_finite()) {
@@ -244,23 +243,24 @@ impl CellData<'_> {
                         fine.coordinate(1, y),
                         fine.coordinate(2, z),
                     );
-                    let Some(located) = shape.locate(p).filter(|at| at.outside <= NEAR) else {
+                    let outside = shape.locate(p, &mut scratch.weights);
+                    let Some(outside) = outside.filter(|&outside| outside <= NEAR) else {
                         continue;
                     };
                     hit = true;
-                    let mark = if own_mark == Mark::Inside && !located.value.is_finite() {
+                    let value = self.field.at(self.mesh, &corners.ids, &scratch.weights, p);
+                    let mark = if own_mark == Mark::Inside && !value.is_finite() {
                         Mark::NotFinite
                     } else {
                         own_mark
                     };
-                    let outside =
-                        if located.outside <= INSIDE_TOLERANCE { 0.0 } else { located.outside };
+                    let outside = if outside <= INSIDE_TOLERANCE { 0.0 } else { outside };
                     // Precedence: inside before near, then the more informative mark, then the
                     // smaller distance, then the first cell.
                     let key = |outside: f64, mark: Mark| (outside == 0.0, rank(mark));
                     let (new, old) = (key(outside, mark), key(slot.outside, slot.mark));
                     if new > old || new == old && outside < slot.outside {
-                        *slot = Sample { value: located.value, outside, mark };
+                        *slot = Sample { value, outside, mark };
                     }
                 }
             }

@@ -2,6 +2,7 @@
 
 use super::mesh::Mesh;
 use super::rasterize::Counts;
+use super::reconstruct::FitQuality;
 use super::{Lattice, Mark, Samples};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -52,6 +53,8 @@ pub struct Report {
     pub straightened_cells: usize,
     /// Error of sampling the lattice back at the mesh.
     pub resampling_error: ResamplingError,
+    /// How well polynomials fit the values of the mesh.
+    pub fit: FitQuality,
 }
 
 impl Report {
@@ -74,6 +77,7 @@ impl Report {
             left_out_cells: mesh.left_out() + counts.non_finite,
             straightened_cells: mesh.higher_order(),
             resampling_error,
+            fit: FitQuality::default(),
         }
     }
 
@@ -94,8 +98,8 @@ impl Report {
         warn(self.not_finite, "nodes are in cells whose values are not finite");
         if 4 * self.missed_cells > self.cells {
             out.push(format!(
-                "{} of {} cells are finer than the lattice; refine it, or average with more \
-                 samples per axis",
+                "{} of {} cells are finer than the lattice; refine it, or average over more samples \
+                 for each node",
                 self.missed_cells, self.cells
             ));
         }

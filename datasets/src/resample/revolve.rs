@@ -1,8 +1,8 @@
 //! Axisymmetric data: revolves a plane of axial position (x) and radius (y) about the x axis.
 //!
 //! The plane is first resampled to an image four times as fine as the lattice. Each node of the
-//! lattice then reads the image at its radius. Linear interpolation in the image adds one sixteenth
-//! of the error of the lattice itself.
+//! lattice then reads the image at its radius, by cubic polynomials: linear ones would give the
+//! gradient steps at the samples of the image.
 
 use super::mesh::Mesh;
 use super::report::{self, Report};
@@ -80,8 +80,41 @@ pub fn revolve(
     Ok(ResampledField { lattice: *lattice, values, marks, report })
 }
 
-/// Bilinear interpolation in the image if all four samples have values; otherwise the mark of the
-/// nearest sample.
+/// The polynomial through the four by four samples around sample position (u, v), within their
+/// values; `None` when one of them has none.
+fn cubic(flat: &ResampledField, u: f64, v: f64) -> Option<f64> {
+    let dims = flat.lattice.dims;
+    let [(i, x), (j, y)] = [(u, dims[0]), (v, dims[1])].map(|(u, n)| {
+        // At a border, the first or last four samples.
+        let first = (u.floor() - 1.0).clamp(0.0, n.saturating_sub(4) as f64);
+        (first as usize, lagrange(u - first - 1.0))
+    });
+    if dims[0] < 4 || dims[1] < 4 {
+        return None;
+    }
+    let (mut sum, mut low, mut high) = (0.0, f64::INFINITY, f64::NEG_INFINITY);
+    for (row, wy) in y.into_iter().enumerate() {
+        for (column, wx) in x.into_iter().enumerate() {
+            let at = i + column + dims[0] * (j + row);
+            let value = f64::from(flat.values[at]);
+            if flat.marks[at] != Mark::Inside {
+                return None;
+            }
+            sum += wx * wy * value;
+            (low, high) = (low.min(value), high.max(value));
+        }
+    }
+    Some(sum.clamp(low, high))
+}
+
+/// Weights at `t` of values at -1, 0, 1 and 2.
+fn lagrange(t: f64) -> [f64; 4] {
+    let [a, b, c, d] = [t + 1.0, t, t - 1.0, t - 2.0];
+    [-b * c * d / 6.0, a * c * d / 2.0, -a * b * d / 2.0, a * b * c / 6.0]
+}
+
+/// Cubic interpolation in the image if the samples around have values, bilinear if only four have;
+/// otherwise the mark of the nearest sample.
 fn sample_image(flat: &ResampledField, x: f64, r: f64) -> (f32, Mark) {
     let Lattice { dims, origin, spacing } = &flat.lattice;
     let (u, v) = ((x - origin.x) / spacing.x, (r - origin.y) / spacing.y);
@@ -111,7 +144,8 @@ fn sample_image(flat: &ResampledField, x: f64, r: f64) -> (f32, Mark) {
         }
     }
     if complete {
-        return (sum as f32, Mark::Inside);
+        let value = cubic(flat, u, v).unwrap_or(sum);
+        return (value as f32, Mark::Inside);
     }
     // At a border, the nearest sample with a value represents a node within half a sample of it.
     match heaviest.1 {

@@ -1,4 +1,4 @@
-//! Finds the parametric coordinates of a point in a cell, and the value there.
+//! Finds the parametric coordinates of a point in a cell, and the shares of its corners there.
 //!
 //! Hexahedra, wedges and pyramids are isoparametric finite elements (orders of VTK; shape functions
 //! as in "The VTK User's Guide", and, for the pyramid, a hexahedron whose upper face is one point).
@@ -9,19 +9,9 @@
 use super::mesh::Shape;
 use glam::{DMat3, DVec3};
 
-/// Result of locating a point in a cell.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct CellSample {
-    /// Interpolated value.
-    pub(super) value: f64,
-    /// Distance outside the cell, in units of the cell; 0 inside.
-    pub(super) outside: f64,
-}
-
 /// A cell with its corners, prepared for queries at many points.
 pub(super) struct Cell<'a> {
     corners: &'a [DVec3],
-    values: &'a [f64],
     shape: &'a Shape,
     /// Whether to use the tetrahedra for all points.
     folded: bool,
@@ -130,11 +120,11 @@ fn corner_parameters(shape: &Shape) -> &'static [DVec3] {
 }
 
 impl<'a> Cell<'a> {
-    pub(super) fn new(corners: &'a [DVec3], values: &'a [f64], shape: &'a Shape) -> Self {
+    pub(super) fn new(corners: &'a [DVec3], shape: &'a Shape) -> Self {
         let (low, high) = corners
             .iter()
             .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| (l.min(*p), h.max(*p)));
-        let mut cell = Cell { corners, values, shape, folded: false, size: (high - low).length() };
+        let mut cell = Cell { corners, shape, folded: false, size: (high - low).length() };
         let parameters = corner_parameters(shape);
         if !parameters.is_empty() {
             let jacobians = parameters.iter().map(|q| cell.map(*q).1.determinant());
@@ -151,44 +141,43 @@ impl<'a> Cell<'a> {
         self.folded
     }
 
-    /// Position relative to the first corner, Jacobian and interpolated value at parameters `q`.
-    fn map(&self, q: DVec3) -> (DVec3, DMat3, f64) {
+    /// Position relative to the first corner and Jacobian at parameters `q`.
+    fn map(&self, q: DVec3) -> (DVec3, DMat3) {
         let (n, d) = basis(self.shape, q);
-        let (mut x, mut j, mut value) = (DVec3::ZERO, DMat3::ZERO, 0.0);
-        for (i, (&p, &v)) in self.corners.iter().zip(self.values).enumerate() {
+        let (mut x, mut j) = (DVec3::ZERO, DMat3::ZERO);
+        for (i, &p) in self.corners.iter().enumerate() {
             let p = p - self.corners[0];
             x += n[i] * p;
             j.x_axis += d[i].x * p;
             j.y_axis += d[i].y * p;
             j.z_axis += d[i].z * p;
-            // 0 · NaN is NaN: a corner without weight must not affect the value.
-            if n[i] != 0.0 {
-                value += n[i] * v;
-            }
         }
-        (x, j, value)
+        (x, j)
     }
 
-    /// Locates `p` in the cell and interpolates the value.
-    pub(super) fn locate(&self, p: DVec3) -> Option<CellSample> {
+    /// Locates `p` in the cell: the distance outside, in units of the cell (0 inside), and in
+    /// `weights` the share of each corner in the element's value there.
+    pub(super) fn locate(&self, p: DVec3, weights: &mut Vec<f64>) -> Option<f64> {
+        weights.clear();
         match self.shape {
             Shape::Tetra => {
                 let c = self.corners;
-                let weights = barycentric(c[0], c[1], c[2], c[3], p, self.size)?;
-                Some(cell_sample(&weights, self.values.iter().copied()))
+                let shares = barycentric(c[0], c[1], c[2], c[3], p, self.size)?;
+                weights.extend(shares);
+                Some(outside_of(&shares))
             }
-            Shape::Faces(_) => self.in_fan(p),
-            _ if self.folded => self.in_fan(p),
-            _ => self.by_newton(p).or_else(|| self.in_fan(p)),
+            Shape::Faces(_) => self.in_fan(p, weights),
+            _ if self.folded => self.in_fan(p, weights),
+            _ => self.by_newton(p, weights).or_else(|| self.in_fan(p, weights)),
         }
     }
 
-    fn by_newton(&self, p: DVec3) -> Option<CellSample> {
+    fn by_newton(&self, p: DVec3, weights: &mut Vec<f64>) -> Option<f64> {
         let target = p - self.corners[0];
         let third = DVec3::new(1.0 / 3.0, 1.0 / 3.0, 0.5);
         let mut q = if *self.shape == Shape::Wedge { third } else { DVec3::splat(0.5) };
         for _ in 0..MAX_STEPS {
-            let (x, jacobian, value) = self.map(q);
+            let (x, jacobian) = self.map(q);
             let det = jacobian.determinant();
             if det == 0.0 || !det.is_finite() {
                 return None;
@@ -208,55 +197,72 @@ impl<'a> Cell<'a> {
                     q - DVec3::ONE
                 };
                 let outside = below.max(above).max_element().max(0.0);
-                return Some(CellSample { value, outside });
+                weights.extend(&basis(self.shape, q).0[..self.corners.len()]);
+                return Some(outside);
             }
         }
         None
     }
 
     /// The best result of the tetrahedra between the cell's centre, face centres and edges.
-    fn in_fan(&self, p: DVec3) -> Option<CellSample> {
+    fn in_fan(&self, p: DVec3, weights: &mut Vec<f64>) -> Option<f64> {
         let centre = mean(self.corners.iter().copied());
-        let centre_value = self.values.iter().sum::<f64>() / self.values.len() as f64;
-        let mut best: Option<CellSample> = None;
-        let mut consider = |face: DVec3, face_value: f64, a: u32, b: u32| {
-            let (a, b) = (a as usize, b as usize);
-            let (pa, pb) = (self.corners[a], self.corners[b]);
-            let Some(w) = barycentric(centre, face, pa, pb, p, self.size) else { return };
-            let sample = cell_sample(
-                &w,
-                [centre_value, face_value, self.values[a], self.values[b]].into_iter(),
-            );
-            if best.is_none_or(|b| sample.outside < b.outside) {
-                best = Some(sample);
+        // The distance outside, the shares of centre, face and two corners, and the face.
+        let mut best: Option<(f64, [f64; 4])> = None;
+        let mut best_face: Vec<u32> = Vec::new();
+        self.shape.each_face(|face| {
+            let at = mean(face.iter().map(|&i| self.corners[i as usize]));
+            for i in 0..face.len() {
+                let next = (i + 1) % face.len();
+                let [a, b] = [face[i], face[next]].map(|k| self.corners[k as usize]);
+                let Some(shares) = barycentric(centre, at, a, b, p, self.size) else { continue };
+                let outside = outside_of(&shares);
+                if best.is_none_or(|(least, _)| outside < least) {
+                    best = Some((outside, shares));
+                    // The edge comes first.
+                    best_face.clear();
+                    best_face.extend((0..face.len()).map(|k| face[(i + k) % face.len()]));
+                }
             }
-        };
-        let mut each_face = |face: &mut dyn ExactSizeIterator<Item = u32>| {
-            let ids: Vec<u32> = face.collect();
-            if ids.len() == 3 {
-                let a = ids[0] as usize;
-                return consider(self.corners[a], self.values[a], ids[1], ids[2]);
-            }
-            let at = mean(ids.iter().map(|&i| self.corners[i as usize]));
-            let value =
-                ids.iter().map(|&i| self.values[i as usize]).sum::<f64>() / ids.len().max(1) as f64;
-            for i in 0..ids.len() {
-                consider(at, value, ids[i], ids[(i + 1) % ids.len()]);
-            }
-        };
-        const HEXA: [[u32; 4]; 6] =
-            [[0, 4, 7, 3], [1, 2, 6, 5], [0, 1, 5, 4], [3, 7, 6, 2], [0, 3, 2, 1], [4, 5, 6, 7]];
+        });
+        let (outside, [of_centre, of_face, a, b]) = best?;
+        weights.clear();
+        weights.resize(self.corners.len(), of_centre / self.corners.len() as f64);
+        for &corner in &best_face {
+            weights[corner as usize] += of_face / best_face.len() as f64;
+        }
+        for (corner, share) in best_face.iter().zip([a, b]) {
+            weights[*corner as usize] += share;
+        }
+        Some(outside)
+    }
+}
+
+impl Shape {
+    /// Calls `f` with the corners of each face.
+    pub(super) fn each_face(&self, mut f: impl FnMut(&[u32])) {
+        const TETRA: [&[u32]; 4] = [&[0, 2, 1], &[0, 1, 3], &[1, 2, 3], &[2, 0, 3]];
+        const HEXA: [&[u32]; 6] = [
+            &[0, 4, 7, 3],
+            &[1, 2, 6, 5],
+            &[0, 1, 5, 4],
+            &[3, 7, 6, 2],
+            &[0, 3, 2, 1],
+            &[4, 5, 6, 7],
+        ];
         const WEDGE: [&[u32]; 5] =
             [&[0, 1, 2], &[3, 5, 4], &[0, 3, 4, 1], &[1, 4, 5, 2], &[2, 5, 3, 0]];
         const PYRAMID: [&[u32]; 5] =
             [&[0, 3, 2, 1], &[0, 1, 4], &[1, 2, 4], &[2, 3, 4], &[3, 0, 4]];
-        match self.shape {
-            Shape::Faces(faces) => faces.iter().for_each(|f| each_face(&mut f.iter().copied())),
-            Shape::Wedge => WEDGE.iter().for_each(|f| each_face(&mut f.iter().copied())),
-            Shape::Pyramid => PYRAMID.iter().for_each(|f| each_face(&mut f.iter().copied())),
-            _ => HEXA.iter().for_each(|f| each_face(&mut f.iter().copied())),
+        match self {
+            Shape::Faces(faces) => {
+                faces.iter().filter(|face| !face.is_empty()).for_each(|face| f(face));
+            }
+            Shape::Tetra => TETRA.into_iter().for_each(f),
+            Shape::Wedge => WEDGE.into_iter().for_each(f),
+            Shape::Pyramid => PYRAMID.into_iter().for_each(f),
+            Shape::Hexa => HEXA.into_iter().for_each(f),
         }
-        best
     }
 }
 
@@ -278,10 +284,9 @@ fn barycentric(a: DVec3, b: DVec3, c: DVec3, d: DVec3, p: DVec3, size: f64) -> O
     Some([1.0 - w.x - w.y - w.z, w.x, w.y, w.z])
 }
 
-fn cell_sample(weights: &[f64; 4], values: impl Iterator<Item = f64>) -> CellSample {
-    let value = weights.iter().zip(values).map(|(w, v)| if *w == 0.0 { 0.0 } else { w * v }).sum();
-    let outside = weights.iter().fold(0.0f64, |o, w| o.max(-w));
-    CellSample { value, outside }
+/// How far outside its tetrahedron a point with these coordinates is.
+fn outside_of(shares: &[f64; 4]) -> f64 {
+    shares.iter().fold(0.0, |most, w| most.max(-w))
 }
 
 #[cfg(test)]
@@ -304,6 +309,15 @@ mod tests {
     }
     fn linear(p: DVec3) -> f64 {
         1.0 + 2.0 * p.x - 3.0 * p.y + 0.5 * p.z
+    }
+
+    /// The distance outside and the value of a field with these values at the corners.
+    fn located(cell: &Cell<'_>, values: &[f64], p: DVec3) -> Option<(f64, f64)> {
+        let mut weights = vec![7.0];
+        let outside = cell.locate(p, &mut weights)?;
+        assert_eq!(weights.len(), values.len());
+        assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-10, "{weights:?}");
+        Some((outside, weights.iter().zip(values).map(|(w, v)| w * v).sum()))
     }
 
     #[test]
@@ -338,14 +352,14 @@ mod tests {
             (tetra, Shape::Tetra),
         ] {
             let values: Vec<f64> = points.iter().map(|p| linear(*p)).collect();
-            let cell = Cell::new(&points, &values, &shape);
+            let cell = Cell::new(&points, &shape);
             assert!(!cell.is_folded());
             let mut inside = 0;
             for i in 0..1000 {
                 let p = DVec3::new((i % 10) as f64, (i / 10 % 10) as f64, (i / 100) as f64) * 0.11;
-                if let Some(at) = cell.locate(p).filter(|at| at.outside == 0.0) {
+                if let Some((_, value)) = located(&cell, &values, p).filter(|at| at.0 == 0.0) {
                     inside += 1;
-                    assert!((at.value - linear(p)).abs() < 1e-10, "{shape:?} at {p}: {at:?}");
+                    assert!((value - linear(p)).abs() < 1e-10, "{shape:?} at {p}: {value}");
                 }
             }
             assert!(inside > 50, "{shape:?}: only {inside} points inside");
@@ -356,17 +370,17 @@ mod tests {
     fn inside_and_outside_of_a_cube() {
         let points = corners(&CUBE);
         let values = vec![0.0; 8];
-        let cell = Cell::new(&points, &values, &Shape::Hexa);
+        let cell = Cell::new(&points, &Shape::Hexa);
         for (p, outside) in [
             ([0.5, 0.5, 0.5], 0.0),
             ([1.0, 1.0, 1.0], 0.0),
             ([1.1, 0.5, 0.5], 0.1),
             ([0.5, -0.2, 1.1], 0.2),
         ] {
-            let got = cell.locate(DVec3::from(p)).unwrap().outside;
+            let got = located(&cell, &values, DVec3::from(p)).unwrap().0;
             assert!((got - outside).abs() < 1e-12, "{p:?}: {got}");
         }
-        assert!(cell.locate(DVec3::splat(50.0)).is_none_or(|at| at.outside >= 0.5));
+        assert!(located(&cell, &values, DVec3::splat(50.0)).is_none_or(|at| at.0 >= 0.5));
     }
 
     #[test]
@@ -384,15 +398,15 @@ mod tests {
             (mirrored, false, DVec3::new(-0.7, 0.3, 0.4)),
         ] {
             let values: Vec<f64> = points.iter().map(|p| linear(*p)).collect();
-            let cell = Cell::new(&points, &values, &Shape::Hexa);
+            let cell = Cell::new(&points, &Shape::Hexa);
             assert_eq!(cell.is_folded(), folded);
-            let at = cell.locate(p).unwrap();
-            assert!(at.outside < 1e-12 && (at.value - linear(p)).abs() < 1e-12, "{at:?}");
+            let (outside, value) = located(&cell, &values, p).unwrap();
+            assert!(outside < 1e-12 && (value - linear(p)).abs() < 1e-12, "{outside} {value}");
         }
         // No volume at all.
         let flat: Vec<DVec3> = corners(&CUBE).iter().map(|p| DVec3::new(p.x, p.y, 0.0)).collect();
-        let cell = Cell::new(&flat, &[0.0; 8], &Shape::Hexa);
-        assert!(cell.is_folded() && cell.locate(DVec3::new(0.5, 0.5, 0.0)).is_none());
+        let cell = Cell::new(&flat, &Shape::Hexa);
+        assert!(cell.is_folded() && located(&cell, &[0.0; 8], DVec3::splat(0.5)).is_none());
     }
 
     #[test]
@@ -400,9 +414,9 @@ mod tests {
         let far = DVec3::splat(1e6);
         let points: Vec<DVec3> = corners(&CUBE).iter().map(|p| far + *p * 1e-3).collect();
         let values: Vec<f64> = corners(&CUBE).iter().map(|p| linear(*p)).collect();
-        let at =
-            Cell::new(&points, &values, &Shape::Hexa).locate(far + DVec3::splat(0.5e-3)).unwrap();
+        let cell = Cell::new(&points, &Shape::Hexa);
+        let (_, value) = located(&cell, &values, far + DVec3::splat(0.5e-3)).unwrap();
         // 1e6 has an ulp of 1.2e-10, which is 1.2e-7 of the cell.
-        assert!((at.value - linear(DVec3::splat(0.5))).abs() < 1e-6);
+        assert!((value - linear(DVec3::splat(0.5))).abs() < 1e-6);
     }
 }

@@ -257,7 +257,8 @@ fn cell_values_are_averaged_and_the_smoothing_shows_in_the_report() {
         Mesh::new(&Dataset::ImageData(ImageData::new([9, 9, 9], DVec3::ZERO, DVec3::ONE))).unwrap();
     let of_cells: Vec<f64> = (0..512).map(|c| if c % 8 < 4 { 0.0 } else { 1.0 }).collect();
     let lattice = lattice_of(&mesh, Resolution::Dims([17, 17, 17]));
-    let r = resample(&mesh, Samples::Cells(&of_cells), &lattice, &Options::default()).unwrap();
+    let options = Options { reconstruction: Reconstruction::Linear, ..Default::default() };
+    let r = resample(&mesh, Samples::Cells(&of_cells), &lattice, &options).unwrap();
     // Cells next to the step at x = 4 have their centres half a cell from the value 1/2 there.
     assert!(
         (r.report.resampling_error.max - 0.25).abs() < 1e-6
@@ -277,17 +278,16 @@ fn samples_within_a_node_average_what_is_finer() {
         .unwrap();
     let values = at_points(&mesh, |p| if (p.x as usize).is_multiple_of(2) { 0.0 } else { 1.0 });
     let lattice = lattice_of(&mesh, Resolution::Dims([9, 2, 2]));
+    let options =
+        |samples_per_axis| Options { samples_per_axis, reconstruction: Reconstruction::Linear };
     let at = |samples_per_axis| {
-        resample(&mesh, Samples::Points(&values), &lattice, &Options { samples_per_axis }).unwrap()
+        resample(&mesh, Samples::Points(&values), &lattice, &options(samples_per_axis)).unwrap()
     };
     let one = at(1);
     assert!(one.values.iter().all(|v| *v == 0.0));
     assert!(one.report.missed_cells > 0 && !one.report.warnings().is_empty());
     assert!(at(8).values.iter().all(|v| (*v - 0.5).abs() < 1e-6), "{:?}", at(8).values);
-    assert!(
-        resample(&mesh, Samples::Points(&values), &lattice, &Options { samples_per_axis: 0 })
-            .is_err()
-    );
+    assert!(resample(&mesh, Samples::Points(&values), &lattice, &options(0)).is_err());
 }
 
 #[test]
@@ -301,7 +301,7 @@ fn the_result_does_not_depend_on_the_number_of_threads() {
                 &mesh,
                 Samples::Points(&values),
                 &lattice,
-                &Options { samples_per_axis: 2 },
+                &Options { samples_per_axis: 2, ..Default::default() },
             )
             .unwrap();
             (r.values.iter().map(|v| v.to_bits()).collect::<Vec<_>>(), r.report)

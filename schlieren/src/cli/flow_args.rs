@@ -7,6 +7,7 @@ use crate::input::Role;
 use crate::scene::{CurveSpec, FlowSpec, Scene};
 use clap::Args;
 use datasets::cli::UsageError;
+use datasets::resample::Reconstruction;
 use std::path::PathBuf;
 
 #[derive(Debug, Clone, Args)]
@@ -61,6 +62,12 @@ pub(super) struct FlowArgs {
     /// Nodes along the longest axis when data are resampled
     #[arg(long, value_name = "N")]
     resample: Option<usize>,
+    /// Samples per axis of which each node is the mean when data are resampled, 1 to 8
+    #[arg(long, value_name = "N", value_parser = units::resample_samples)]
+    resample_samples: Option<usize>,
+    /// Values between the points of a mesh: cubic (smooth, of fourth order) or linear (as VTK's)
+    #[arg(long, value_name = "HOW", value_parser = units::reconstruction)]
+    reconstruction: Option<Reconstruction>,
     /// Standard deviation of the smoothing of shocks, in nodes
     #[arg(long, value_name = "NODES")]
     smoothing: Option<f64>,
@@ -110,6 +117,8 @@ impl FlowArgs {
         f.span = a.span.or(f.span.filter(|_| !a.revolve));
         f.revolve = a.revolve || (f.revolve && a.span.is_none());
         f.resample_nodes = a.resample.or(f.resample_nodes);
+        f.resample_samples = a.resample_samples.unwrap_or(f.resample_samples);
+        f.reconstruction = a.reconstruction.unwrap_or(f.reconstruction);
         f.smoothing_nodes = a.smoothing.unwrap_or(f.smoothing_nodes);
         f.outside = a.outside.unwrap_or(f.outside);
         f.hidden = a.hidden.unwrap_or(f.hidden);

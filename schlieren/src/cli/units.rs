@@ -3,6 +3,7 @@
 use crate::index::multifield::Rule;
 use crate::input::Role;
 use crate::scene::SourceSpec;
+use datasets::resample::Reconstruction;
 
 /// Units of lengths.
 const LENGTHS: [(&str, f64); 6] =
@@ -119,6 +120,18 @@ pub(super) fn role(text: &str) -> Result<Role, String> {
         "gas" => Ok(Role::Gas),
         _ => Err(format!("`{text}` is not a role; there are: blank, solid, gas")),
     }
+}
+
+/// Parses a way to compute values between the points of a mesh.
+pub(super) fn reconstruction(text: &str) -> Result<Reconstruction, String> {
+    let found = Reconstruction::ALL.into_iter().find(|r| r.name() == text);
+    found.ok_or_else(|| format!("`{text}` is not a reconstruction; there are: linear, cubic"))
+}
+
+/// Parses a number of samples per axis and node.
+pub(super) fn resample_samples(text: &str) -> Result<usize, String> {
+    let number = text.parse::<usize>().ok().filter(|n| (1..=8).contains(n));
+    number.ok_or_else(|| format!("`{text}` is not a number of samples from 1 to 8"))
 }
 
 /// Parses two numbers, `320,200`.

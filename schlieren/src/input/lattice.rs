@@ -123,7 +123,10 @@ impl SamplePoints {
                 let lattice = target(mesh, own.as_ref(), options)?;
                 let samples =
                     if *per_point { Samples::Points(&values) } else { Samples::Cells(&values) };
-                let how = resample::Options { samples_per_axis: options.samples_per_axis };
+                let how = resample::Options {
+                    samples_per_axis: options.samples_per_axis,
+                    reconstruction: options.reconstruction,
+                };
                 let r = match options.depth {
                     Some(Depth::Revolve) => revolve(mesh, samples, &lattice, &how)?,
                     _ => resample_mesh(mesh, samples, &lattice, &how)?,

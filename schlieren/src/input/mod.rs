@@ -26,7 +26,7 @@ use crate::index::IndexError;
 use crate::index::conditions::Model;
 use datasets::model::{Dataset, ModelError};
 use datasets::read::ReadError;
-use datasets::resample::{self, Mark, ResampleError, Resolution};
+use datasets::resample::{self, Mark, Reconstruction, ResampleError, Resolution};
 use glam::DVec3;
 use std::path::{Path, PathBuf};
 
@@ -120,6 +120,8 @@ pub struct Options {
     pub depth: Option<Depth>,
     /// See [`resample::Options`].
     pub samples_per_axis: usize,
+    /// How values between the points of a mesh are computed when it is resampled.
+    pub reconstruction: Reconstruction,
     /// Standard deviation of the shock smoothing in nodes: 0 for none, 1 to 1.4 for shocks that are
     /// one cell wide.
     pub smoothing_nodes: f64,
@@ -144,6 +146,7 @@ impl Options {
             bounds: None,
             depth: None,
             samples_per_axis: 1,
+            reconstruction: Reconstruction::default(),
             smoothing_nodes: 0.0,
             outside: Role::Blank,
             hidden: Role::Solid,

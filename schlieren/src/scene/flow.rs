@@ -5,7 +5,7 @@ use crate::index::Gas;
 use crate::index::conditions::Model;
 use crate::index::multifield::{Rule, TransferFunction};
 use crate::input::{Depth, Medium, Options, Quantity, Reference, Role};
-use datasets::resample::Resolution;
+use datasets::resample::{Reconstruction, Resolution};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -72,6 +72,13 @@ pub struct FlowSpec {
     /// cells when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub resample_nodes: Option<usize>,
+    /// A node gets the mean over this many samples per axis of the box around it when the data have
+    /// to be resampled; 1 takes the value at the node.
+    #[serde(default = "one_sample")]
+    pub resample_samples: usize,
+    /// How values between the points of a mesh are computed when the data have to be resampled.
+    #[serde(default)]
+    pub reconstruction: Reconstruction,
     /// Standard deviation of the smoothing of shocks, in nodes; 0 for none.
     #[serde(default)]
     pub smoothing_nodes: f64,
@@ -113,6 +120,10 @@ fn one() -> f64 {
     1.0
 }
 
+fn one_sample() -> usize {
+    1
+}
+
 fn blank() -> Role {
     Role::Blank
 }
@@ -142,6 +153,8 @@ impl Default for FlowSpec {
             span: None,
             revolve: false,
             resample_nodes: None,
+            resample_samples: one_sample(),
+            reconstruction: Reconstruction::default(),
             smoothing_nodes: 0.0,
             outside: blank(),
             hidden: solid(),
@@ -166,6 +179,8 @@ impl FlowSpec {
             span: self.span,
             revolve: self.revolve,
             resample_nodes: self.resample_nodes,
+            resample_samples: self.resample_samples,
+            reconstruction: self.reconstruction,
             smoothing_nodes: self.smoothing_nodes,
             outside: self.outside,
             hidden: self.hidden,
@@ -297,6 +312,8 @@ impl FlowSpec {
             length_unit_m: self.length_unit_m,
             resolution: self.resample_nodes.map_or(Resolution::Auto, Resolution::Longest),
             depth: if self.revolve { Some(Depth::Revolve) } else { self.span.map(Depth::Span) },
+            samples_per_axis: self.resample_samples,
+            reconstruction: self.reconstruction,
             smoothing_nodes: self.smoothing_nodes,
             outside: self.outside,
             hidden: self.hidden,

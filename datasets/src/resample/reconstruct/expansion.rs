@@ -1,0 +1,371 @@
+//! The polynomial around a point of a mesh.
+
+use super::cell_moments::CellMoments;
+use super::least_squares::NormalEquations;
+use super::neighbours::Neighbourhood;
+use super::polynomial::{TERMS, TERMS_TO_DEGREE, means, monomials};
+use crate::resample::mesh::Mesh;
+use glam::DVec3;
+
+/// Number of the nearest values that a polynomial is fitted to, two for each unknown. (With 32, a
+/// power hangs on one value in some cells; with 56, nothing gains.)
+const NEAREST: usize = 40;
+/// As many when these leave a power undetermined, as at borders.
+const MORE: usize = 120;
+/// Equations for each unknown, at least.
+const EQUATIONS_PER_TERM: f64 = 1.25;
+
+/// Samples nearer than this, squared and in the frame, weigh as if they were there: a point twice in
+/// the mesh, or a cell around the point.
+const NEAREST_SQUARE: f64 = 0.2;
+
+/// A polynomial whose residual, as a part of the variation around the point, is below the first
+/// number is used as it is; from the second on, it is not used. Cubic polynomials leave some 0.3 of
+/// a step and 0.6 of noise, and less than 0.05 of a bell whose width is three cells.
+const RESIDUAL: [f64; 2] = [0.1, 0.25];
+
+/// Four values along a line leave nothing of a cubic polynomial to judge it by, and cells around a
+/// point, or points at a border, are no more. The residual of the polynomial of second degree on
+/// the same values counts too, times this. It is 0.45 for averages on both sides of a step, and
+/// 0.03 for the bell.
+const QUADRATIC_SHARE: f64 = 0.7;
+
+/// Number of samples that limit a gradient: on a cubic grid, those that share a cell.
+const ADJACENT: usize = 26;
+
+/// How far a polynomial may go beyond the values around the point, as a part of their range. A
+/// maximum between points is higher than they are.
+const BEYOND: f64 = 0.25;
+
+/// How well a polynomial fits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum State {
+    Fitted,
+    Limited,
+    FewNeighbours,
+    NoValue,
+}
+
+/// A polynomial in a frame of its own, in which the neighbours have the same spread along all axes:
+/// in stretched cells, a polynomial in lengths would have coefficients whose sum loses all digits.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Expansion {
+    /// Lower triangle of the matrix from distances to the frame: xx, yx, yy, zx, zy, zz.
+    frame: [f32; 6],
+    /// What is added to the point's value, and the coefficients of the monomials.
+    constant: f32,
+    terms: [f32; TERMS],
+    /// Bounds of what is added to the point's value.
+    low: f32,
+    high: f32,
+    state: State,
+}
+
+impl Expansion {
+    /// Adds nothing to the point's value.
+    const fn nothing(state: State) -> Expansion {
+        Expansion {
+            frame: [0.0; 6],
+            constant: 0.0,
+            terms: [0.0; TERMS],
+            low: 0.0,
+            high: 0.0,
+            state,
+        }
+    }
+
+    pub(super) fn state(&self) -> State {
+        self.state
+    }
+
+    /// Whether the polynomial is used as it is.
+    pub(super) fn is_whole(&self) -> bool {
+        self.state == State::Fitted
+    }
+
+    /// The value at distance `d` from the point, whose own value is `value`.
+    #[inline]
+    pub(super) fn at(&self, value: f64, d: DVec3) -> f64 {
+        let terms = monomials(in_frame(&self.frame, d));
+        let sum: f64 = self.terms.iter().zip(terms).map(|(c, m)| f64::from(*c) * m).sum();
+        let change = f64::from(self.constant) + sum;
+        value + change.clamp(f64::from(self.low), f64::from(self.high))
+    }
+}
+
+#[inline]
+fn in_frame(f: &[f32; 6], d: DVec3) -> DVec3 {
+    let f = f.map(f64::from);
+    DVec3::new(f[0] * d.x, f[1] * d.x + f[2] * d.y, f[3] * d.x + f[4] * d.y + f[5] * d.z)
+}
+
+/// Second moments in the frame.
+fn moments_in_frame(f: &[f32; 6], s: [f64; 6]) -> [f64; 6] {
+    let rows = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| in_frame(f, axis));
+    // The columns of the matrix are the images of the axes.
+    let row = |i: usize| DVec3::new(rows[0][i], rows[1][i], rows[2][i]);
+    let times = |v: DVec3| {
+        DVec3::new(
+            s[0] * v.x + s[1] * v.y + s[2] * v.z,
+            s[1] * v.x + s[3] * v.y + s[4] * v.z,
+            s[2] * v.x + s[4] * v.y + s[5] * v.z,
+        )
+    };
+    let (x, y, z) = (row(0), row(1), row(2));
+    [
+        x.dot(times(x)),
+        x.dot(times(y)),
+        x.dot(times(z)),
+        y.dot(times(y)),
+        y.dot(times(z)),
+        z.dot(times(z)),
+    ]
+}
+
+/// The inverse of the Cholesky factor of the neighbours' spread; `None` when they are all at one
+/// place.
+fn frame_of(spread: [f64; 6]) -> Option<[f32; 6]> {
+    let [xx, xy, xz, yy, yz, zz] = spread;
+    let size = xx + yy + zz;
+    if !(size > 0.0 && size.is_finite()) {
+        return None;
+    }
+    // Of a plane without thickness, the normal gets a scale all the same.
+    let least = 1e-20 * size;
+    let a = (xx + least).sqrt();
+    let (b, c) = (xy / a, xz / a);
+    let d = (yy - b * b).max(least).sqrt();
+    let e = (yz - b * c) / d;
+    let f = (zz - c * c - e * e).max(least).sqrt();
+    let frame = [1.0 / a, -b / (a * d), 1.0 / d, (b * e / d - c) / (a * f), -e / (d * f), 1.0 / f];
+    let frame = frame.map(|x| x as f32);
+    frame.iter().all(|x| x.is_finite()).then_some(frame)
+}
+
+/// A value at a place, and its distance from the point, squared, in the frame.
+#[derive(Debug, Clone, Copy)]
+struct Sample {
+    square: f64,
+    id: u32,
+    value: f64,
+    /// Mean position in the frame.
+    place: DVec3,
+    /// Second moments in the frame.
+    second: [f64; 6],
+}
+
+/// The fitting of one polynomial; memory that is used again.
+#[derive(Default)]
+pub(super) struct Fit {
+    samples: Vec<Sample>,
+}
+
+impl Fit {
+    /// A polynomial through the value of `point`.
+    pub(super) fn to_points(
+        &mut self,
+        mesh: &Mesh,
+        values: &[f64],
+        point: usize,
+        around: &Neighbourhood,
+    ) -> Expansion {
+        let (value, place) = (values[point], mesh.point(point));
+        if !(value.is_finite() && place.is_finite()) {
+            return Expansion::nothing(State::NoValue);
+        }
+        let distance = |id: u32| mesh.point(id as usize) - place;
+        let Some(frame) = frame_of(around.spread(distance, |_| [0.0; 6])) else {
+            return Expansion::nothing(State::FewNeighbours);
+        };
+        self.samples.clear();
+        self.samples.extend(around.ids.iter().map(|&id| {
+            let place = in_frame(&frame, distance(id));
+            let value = values[id as usize] - value;
+            Sample { square: place.length_squared(), id, value, place, second: [0.0; 6] }
+        }));
+        self.fit(frame, rounding(value), false)
+    }
+
+    /// A polynomial whose averages over the cells around `point` are near those of `cells`. `value`
+    /// remains where none fits.
+    pub(super) fn to_cells(
+        &mut self,
+        mesh: &Mesh,
+        cells: &[f64],
+        moments: &CellMoments,
+        value: f64,
+        point: usize,
+        around: &Neighbourhood,
+    ) -> Expansion {
+        let place = mesh.point(point);
+        if !(value.is_finite() && place.is_finite()) {
+            return Expansion::nothing(State::NoValue);
+        }
+        let distance = |id: u32| moments.get(id as usize).centre - place;
+        // A point at a corner of the mesh has one cell, which alone would be a direction only.
+        let own = |id: u32| moments.get(id as usize).second;
+        let Some(frame) = frame_of(around.spread(distance, own)) else {
+            return Expansion::nothing(State::FewNeighbours);
+        };
+        self.samples.clear();
+        self.samples.extend(around.ids.iter().map(|&id| {
+            let place = in_frame(&frame, distance(id));
+            let second = moments_in_frame(&frame, moments.get(id as usize).second);
+            let value = cells[id as usize] - value;
+            Sample { square: place.length_squared(), id, value, place, second }
+        }));
+        self.fit(frame, rounding(value), true)
+    }
+
+    /// Fits to the samples.
+    fn fit(&mut self, frame: [f32; 6], rounding: f64, free: bool) -> Expansion {
+        let finite = |s: &Sample| s.value.is_finite() && s.square.is_finite();
+        self.samples.retain(|s| finite(s) && (s.square > 0.0 || free));
+        // The number breaks ties, so that the order does not depend on how they were found.
+        self.samples.sort_unstable_by(|a, b| a.square.total_cmp(&b.square).then(a.id.cmp(&b.id)));
+        let around = within(&self.samples, NEAREST).iter();
+        let (low, high) =
+            around.fold((0.0f64, 0.0f64), |(l, h), s| (l.min(s.value), h.max(s.value)));
+        let mut best = None;
+        for wanted in [NEAREST, MORE] {
+            let samples = within(&self.samples, wanted);
+            let solution = Solution::of(samples, rounding, free);
+            let complete = solution.as_ref().is_some_and(|s| s.complete);
+            best = solution.or(best);
+            if complete || samples.len() == self.samples.len() {
+                break;
+            }
+        }
+        let Some(solution) = best else { return Expansion::nothing(State::FewNeighbours) };
+        let share = share_of(solution.residual);
+        let mut coefficients = solution.coefficients.map(|c| share * c);
+        if share < 1.0 {
+            let gradient = limited(solution.gradient, within(&self.samples, ADJACENT));
+            for (sum, g) in coefficients[1..].iter_mut().zip(gradient.to_array()) {
+                *sum += (1.0 - share) * 0.5 * g;
+            }
+        }
+        let slack = BEYOND * (high - low);
+        let [constant, terms @ ..] = coefficients.map(|c| c as f32);
+        Expansion {
+            frame,
+            constant,
+            terms,
+            low: (low - slack) as f32,
+            high: (high + slack) as f32,
+            state: match (share, solution.degree) {
+                (_, 0 | 1) => State::FewNeighbours,
+                (1.0, _) => State::Fitted,
+                _ => State::Limited,
+            },
+        }
+    }
+}
+
+/// The gradient, shortened until it leads to no value beyond those of the samples (Barth and
+/// Jespersen, "The design and application of upwind schemes on unstructured meshes", 1989): no
+/// values below those on both sides of a shock.
+fn limited(gradient: DVec3, samples: &[Sample]) -> DVec3 {
+    let range = |(low, high): (f64, f64), s: &Sample| (low.min(s.value), high.max(s.value));
+    let (low, high) = samples.iter().fold((0.0, 0.0), range);
+    let share = samples.iter().fold(1.0f64, |share, s| {
+        let change = gradient.dot(s.place);
+        let most = if change > 0.0 { high } else { low };
+        // No change is in any range.
+        if change == 0.0 { share } else { share.min(most / change) }
+    });
+    gradient * share
+}
+
+/// Most files have values in f32. Where these differ by rounding only, there is nothing to limit.
+fn rounding(value: f64) -> f64 {
+    value.abs() * f64::from(f32::EPSILON)
+}
+
+/// The `wanted` nearest samples, and those that are as near as the last of them.
+fn within(samples: &[Sample], wanted: usize) -> &[Sample] {
+    let Some(last) = samples.get(wanted.saturating_sub(1)) else { return samples };
+    let end = samples.partition_point(|s| s.square <= last.square * (1.0 + 1e-6));
+    &samples[..end]
+}
+
+/// The share of a polynomial that is used: 1 for small residuals, 0 for large ones, smooth between.
+fn share_of(residual: f64) -> f64 {
+    let [whole, none] = RESIDUAL;
+    let x = ((none - residual) / (none - whole)).clamp(0.0, 1.0);
+    // NaN is not used.
+    if x.is_nan() { 0.0 } else { x * x * (3.0 - 2.0 * x) }
+}
+
+/// A polynomial and how well it fits.
+///
+/// Where it does not, half of the linear fit's gradient takes its place: the elements' mean of such
+/// lines has the mean slope at each point from both sides, so that a captured shock has no steps at the faces of its cells.
+struct Solution {
+    /// The constant, and the coefficients of the monomials.
+    coefficients: [f64; TERMS + 1],
+    degree: usize,
+    /// The gradient of the linear fit, in the frame.
+    gradient: DVec3,
+    /// Root mean square of the residuals by that of the values, for as many equations as there are
+    /// more than unknowns.
+    residual: f64,
+    /// Whether the samples determine all powers up to the third degree.
+    complete: bool,
+}
+
+impl Solution {
+    /// `None` with too few samples for a gradient. A polynomial that is not `free` has no constant.
+    fn of(samples: &[Sample], rounding: f64, free: bool) -> Option<Solution> {
+        let constant = usize::from(free);
+        let enough = |d: &usize| {
+            samples.len() as f64 >= EQUATIONS_PER_TERM * (TERMS_TO_DEGREE[*d] + constant) as f64
+        };
+        let degree = (1..=3).rev().find(enough)?;
+        // The constant is the first unknown; without it, its column is zero and is left out.
+        let used = 1 + TERMS_TO_DEGREE[degree];
+        let row = |s: &Sample| {
+            let mut row = [0.0; TERMS + 1];
+            row[0] = constant as f64;
+            row[1..].copy_from_slice(&means(s.place, s.second));
+            row
+        };
+        // The error of a cubic polynomial grows with the fourth power of the distance. Deflections
+        // through a bell have half the error that weights of the fourth power give.
+        let weight = |s: &Sample| s.square.max(NEAREST_SQUARE).powi(-4);
+        // With these weights, the polynomial goes through the nearest values whatever they are. So
+        // it is judged by those around too.
+        let judged = |s: &Sample| s.square.max(NEAREST_SQUARE).powi(-2);
+        let mut equations = NormalEquations::<{ TERMS + 1 }>::EMPTY;
+        let (mut weights, mut mean) = (0.0, 0.0);
+        for s in samples {
+            equations.add(&row(s), s.value, weight(s), used);
+            weights += judged(s);
+            mean += judged(s) * s.value;
+        }
+        let coefficients = equations.solve(used);
+        let known = coefficients[1..used].iter().filter(|c| **c != 0.0).count();
+        // The variation is that about the point's value, or about the mean of the averages.
+        let centre = if free { mean / weights } else { 0.0 };
+        let variation: f64 = samples.iter().map(|s| judged(s) * (s.value - centre).powi(2)).sum();
+        let residual_of = |coefficients: &[f64; TERMS + 1]| {
+            let known = coefficients[1..].iter().filter(|c| **c != 0.0).count();
+            let fitted =
+                |s: &Sample| coefficients.iter().zip(row(s)).map(|(c, m)| c * m).sum::<f64>();
+            let squares: f64 =
+                samples.iter().map(|s| judged(s) * (fitted(s) - s.value).powi(2)).sum();
+            let surplus = (samples.len() - known.min(samples.len() - 1)) as f64;
+            let above_rounding =
+                squares * samples.len() as f64 / surplus - weights * rounding * rounding;
+            if above_rounding > 0.0 { (above_rounding / variation).sqrt() } else { 0.0 }
+        };
+        let mut residual = residual_of(&coefficients);
+        if degree == 3 {
+            let quadratic = equations.solve(1 + TERMS_TO_DEGREE[2]);
+            residual = residual.max(QUADRATIC_SHARE * residual_of(&quadratic));
+        }
+        let linear = equations.solve(1 + TERMS_TO_DEGREE[1]);
+        let gradient = DVec3::new(linear[1], linear[2], linear[3]);
+        Some(Solution { coefficients, degree, gradient, residual, complete: known == TERMS })
+    }
+}

@@ -1,0 +1,184 @@
+//! Smooth values between the points of a mesh.
+//!
+//! The finite elements of a mesh are linear along its edges, so their gradients jump from cell to
+//! cell. Light is bent by gradients: a lattice finer than the mesh would show the cells. Here, each
+//! point gets a polynomial of up to third degree, fitted by weighted least squares to the values
+//! around it ([`expansion`]), and the value at a place in a cell is the mean of the polynomials of
+//! the cell's corners, weighted by the shape functions of the element. This is a partition of unity
+//! (Melenk and Babuška, "The partition of unity finite element method", 1996): continuous, exact
+//! for cubic fields, and with an error of fourth order in the size of the cells (third order for
+//! gradients) where the field is smooth.
+//!
+//! Where no polynomial fits, as at shocks, it gives way to a line with half of a limited gradient,
+//! which makes no new extrema.
+//!
+//! Values of cells are taken as what solvers of finite volumes mean by them, averages over the
+//! cells: the averages of the polynomials are fitted to them ([`cell_moments`]).
+
+mod cell_moments;
+mod expansion;
+mod least_squares;
+mod neighbours;
+mod polynomial;
+
+use super::mesh::Mesh;
+use cell_moments::CellMoments;
+use expansion::{Expansion, Fit};
+use glam::DVec3;
+use neighbours::{Incidence, Neighbourhood};
+use rayon::prelude::*;
+
+/// How values between the points of a mesh are computed.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Reconstruction {
+    /// By the linear, bilinear and trilinear functions of the cells. Gradients jump at the faces.
+    Linear,
+    /// By polynomials of third degree, or limited gradients where none fits. Needs about 120 bytes for each
+    /// point of the mesh.
+    #[default]
+    Cubic,
+}
+
+impl Reconstruction {
+    /// All ways, from the cheapest.
+    pub const ALL: [Reconstruction; 2] = [Reconstruction::Linear, Reconstruction::Cubic];
+
+    /// Its name in options.
+    pub fn name(self) -> &'static str {
+        match self {
+            Reconstruction::Linear => "linear",
+            Reconstruction::Cubic => "cubic",
+        }
+    }
+}
+
+/// Values everywhere in a mesh.
+pub(super) struct PointField<'a> {
+    values: &'a [f64],
+    /// One for each point; none for [`Reconstruction::Linear`].
+    expansions: Vec<Expansion>,
+}
+
+/// How well the polynomials fit.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct FitQuality {
+    /// Points whose polynomial fits.
+    pub fitted: usize,
+    /// Points where the polynomial is faded out, wholly or in part: shocks, noise, features of the
+    /// size of the cells.
+    pub limited: usize,
+    /// Points with too few neighbours for a polynomial of second degree.
+    pub few_neighbours: usize,
+    /// Root mean square over the cells of the difference of their corners' polynomials in the
+    /// middle of the cell, in the unit of the values: an estimate of the error of the mesh itself.
+    pub rms_difference: f64,
+    /// Largest such difference.
+    pub max_difference: f64,
+}
+
+impl<'a> PointField<'a> {
+    /// The elements' own interpolation of values at points.
+    pub(super) fn linear(values: &'a [f64]) -> PointField<'a> {
+        PointField { values, expansions: vec![] }
+    }
+
+    /// Fits polynomials to values at points.
+    pub(super) fn of_points(mesh: &Mesh, values: &'a [f64]) -> PointField<'a> {
+        let incidence = Incidence::of(mesh);
+        let fit = |point: usize, around: &mut Neighbourhood, fit: &mut Fit| {
+            around.points(mesh, &incidence, point);
+            fit.to_points(mesh, values, point, around)
+        };
+        PointField { values, expansions: fitted(mesh, fit) }
+    }
+
+    /// Fits polynomials to averages over cells. `values` are the means at the points, which remain
+    /// where no polynomial fits.
+    pub(super) fn of_cells(mesh: &Mesh, cells: &[f64], values: &'a [f64]) -> PointField<'a> {
+        let incidence = Incidence::of(mesh);
+        let moments = CellMoments::of(mesh);
+        let fit = |point: usize, around: &mut Neighbourhood, fit: &mut Fit| {
+            around.cells(mesh, &incidence, &moments, point);
+            fit.to_cells(mesh, cells, &moments, values[point], point, around)
+        };
+        PointField { values, expansions: fitted(mesh, fit) }
+    }
+
+    /// The value at `p` in the cell with these corners, from the weights of its element.
+    pub(super) fn at(&self, mesh: &Mesh, corners: &[u32], weights: &[f64], p: DVec3) -> f64 {
+        let mut sum = 0.0;
+        for (&id, &weight) in corners.iter().zip(weights) {
+            // 0 · NaN is NaN: a corner without weight must not affect the value.
+            if weight != 0.0 {
+                sum += weight * self.of_corner(mesh, id as usize, p);
+            }
+        }
+        sum
+    }
+
+    #[inline]
+    fn of_corner(&self, mesh: &Mesh, id: usize, p: DVec3) -> f64 {
+        match self.expansions.get(id) {
+            Some(expansion) => expansion.at(self.values[id], p - mesh.point(id)),
+            None => self.values[id],
+        }
+    }
+
+    /// How well the polynomials fit; nothing without polynomials.
+    pub(super) fn quality(&self, mesh: &Mesh) -> FitQuality {
+        let mut quality = FitQuality::default();
+        for expansion in &self.expansions {
+            match expansion.state() {
+                expansion::State::Fitted => quality.fitted += 1,
+                expansion::State::Limited => quality.limited += 1,
+                expansion::State::FewNeighbours => quality.few_neighbours += 1,
+                expansion::State::NoValue => {}
+            }
+        }
+        if self.expansions.is_empty() {
+            return quality;
+        }
+        let difference = |cell: usize| {
+            let middle = mesh.cell_centre(cell);
+            let ids = mesh.corners(cell).ids;
+            let values = ids.iter().map(|&id| self.of_corner(mesh, id as usize, middle));
+            let (low, high) =
+                values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+            let fits = ids.iter().all(|&id| self.expansions[id as usize].is_whole());
+            Some(high - low).filter(|d| fits && d.is_finite() && !mesh.is_hidden(cell))
+        };
+        // In pieces of a fixed size, so that the sum does not depend on the number of threads.
+        const PIECE: usize = 1 << 14;
+        let pieces: Vec<(f64, f64, usize)> = (0..mesh.num_cells().div_ceil(PIECE))
+            .into_par_iter()
+            .map(|piece| {
+                let cells = piece * PIECE..mesh.num_cells().min((piece + 1) * PIECE);
+                cells
+                    .filter_map(difference)
+                    .fold((0.0, 0.0f64, 0), |(sum, most, n), d| (sum + d * d, most.max(d), n + 1))
+            })
+            .collect();
+        let count: usize = pieces.iter().map(|p| p.2).sum();
+        quality.rms_difference =
+            (pieces.iter().map(|p| p.0).sum::<f64>() / count.max(1) as f64).sqrt();
+        quality.max_difference = pieces.iter().map(|p| p.1).fold(0.0, f64::max);
+        quality
+    }
+}
+
+/// One expansion for each point, with scratch memory for each thread.
+fn fitted(
+    mesh: &Mesh,
+    fit: impl Fn(usize, &mut Neighbourhood, &mut Fit) -> Expansion + Sync,
+) -> Vec<Expansion> {
+    let scratch = || (Neighbourhood::default(), Fit::default());
+    (0..mesh.num_points())
+        .into_par_iter()
+        .with_min_len(256)
+        .map_init(scratch, |(around, fitter), point| fit(point, around, fitter))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests;

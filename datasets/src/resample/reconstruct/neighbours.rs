@@ -1,0 +1,208 @@
+//! The points and cells around a point of a mesh.
+
+use super::cell_moments::CellMoments;
+use crate::resample::mesh::Mesh;
+use glam::DVec3;
+use rayon::prelude::*;
+use std::collections::HashMap;
+
+/// Which points belong to which cells. Points of different blocks at the same place are one.
+pub(super) struct Incidence {
+    /// The first of the points at the same place.
+    same: Vec<u32>,
+    corners: Rows,
+    cells: Rows,
+}
+
+/// Lists one after the other.
+struct Rows {
+    starts: Vec<usize>,
+    values: Vec<u32>,
+}
+
+impl Rows {
+    fn row(&self, i: usize) -> &[u32] {
+        &self.values[self.starts[i]..self.starts[i + 1]]
+    }
+}
+
+impl Incidence {
+    /// Hidden cells are left out: their values are not those of the flow.
+    pub(super) fn of(mesh: &Mesh) -> Incidence {
+        let mut first: HashMap<[u64; 3], u32> = HashMap::with_capacity(mesh.num_points());
+        let same: Vec<u32> = (0..mesh.num_points())
+            .map(|i| {
+                // Adding zero makes -0 the same place as 0.
+                let place = mesh.point(i).to_array().map(|x| (x + 0.0).to_bits());
+                *first.entry(place).or_insert(i as u32)
+            })
+            .collect();
+        drop(first);
+        let of_cell = |cell: usize| {
+            let ids = if mesh.is_hidden(cell) { vec![] } else { mesh.corners(cell).ids };
+            ids.into_iter().map(|id| same[id as usize]).collect::<Vec<u32>>()
+        };
+        // In pieces, because a list for each cell takes four times the memory.
+        const PIECE: usize = 1 << 14;
+        let mut corners = Rows { starts: vec![0], values: vec![] };
+        for first in (0..mesh.num_cells()).step_by(16 * PIECE) {
+            let cells = first..mesh.num_cells().min(first + 16 * PIECE);
+            let lists: Vec<Vec<u32>> = cells.into_par_iter().map(of_cell).collect();
+            for list in lists {
+                corners.values.extend(&list);
+                corners.starts.push(corners.values.len());
+            }
+        }
+        let mut starts = vec![0usize; mesh.num_points() + 1];
+        corners.values.iter().for_each(|&id| starts[id as usize + 1] += 1);
+        for i in 0..mesh.num_points() {
+            starts[i + 1] += starts[i];
+        }
+        let mut next = starts.clone();
+        let mut values = vec![0u32; corners.values.len()];
+        for cell in 0..mesh.num_cells() {
+            for &id in corners.row(cell) {
+                values[next[id as usize]] = cell as u32;
+                next[id as usize] += 1;
+            }
+        }
+        Incidence { same, corners, cells: Rows { starts, values } }
+    }
+}
+
+/// The neighbours of one point, in the order in which they were found; memory that is used again.
+#[derive(Default)]
+pub(super) struct Neighbourhood {
+    /// Points or cells within two steps.
+    pub(super) ids: Vec<u32>,
+    /// How many of them are within one step; they come first.
+    pub(super) near: usize,
+    /// The point that was last seen at, for each point and each cell.
+    seen_points: Vec<u32>,
+    seen_cells: Vec<u32>,
+    ring: Vec<u32>,
+}
+
+/// With as many neighbours within two steps, none at three steps are needed. On a cubic grid, 124
+/// points are within two steps of a point, and 64 cells.
+const ENOUGH: usize = 60;
+
+/// Steps from cell to cell, at most: at a corner of a mesh.
+const MOST_STEPS: usize = 4;
+
+/// Beyond this number nothing is added: points at which thousands of cells meet.
+const MOST: usize = 512;
+
+impl Neighbourhood {
+    /// The points that share a cell with `point`, and those that share one with these, without the
+    /// point itself.
+    pub(super) fn points(&mut self, mesh: &Mesh, incidence: &Incidence, point: usize) {
+        self.start(mesh, incidence, point);
+        let centre = incidence.same[point];
+        self.ids.clear();
+        self.grow_points(incidence, point as u32, &[centre]);
+        self.near = self.ids.len();
+        // Two steps, and more at borders and among tetrahedra.
+        let mut first = 0;
+        for step in 2..=MOST_STEPS {
+            if step > 2 && self.ids.len() >= ENOUGH {
+                break;
+            }
+            let mut ring = std::mem::take(&mut self.ring);
+            ring.clear();
+            ring.extend(&self.ids[first..]);
+            first = self.ids.len();
+            self.grow_points(incidence, point as u32, &ring);
+            self.ring = ring;
+        }
+    }
+
+    fn start(&mut self, mesh: &Mesh, incidence: &Incidence, point: usize) {
+        if self.seen_points.len() != mesh.num_points() {
+            self.seen_points = vec![u32::MAX; mesh.num_points()];
+        }
+        if self.seen_cells.len() != mesh.num_cells() {
+            self.seen_cells = vec![u32::MAX; mesh.num_cells()];
+        }
+        self.seen_points[incidence.same[point] as usize] = point as u32;
+    }
+
+    /// Adds the points that share a cell with one of `from` and were not seen yet.
+    fn grow_points(&mut self, incidence: &Incidence, stamp: u32, from: &[u32]) {
+        for &p in from {
+            for &cell in incidence.cells.row(p as usize) {
+                if std::mem::replace(&mut self.seen_cells[cell as usize], stamp) == stamp {
+                    continue;
+                }
+                for &id in incidence.corners.row(cell as usize) {
+                    let seen = &mut self.seen_points[id as usize];
+                    if std::mem::replace(seen, stamp) != stamp && self.ids.len() < MOST {
+                        self.ids.push(id);
+                    }
+                }
+            }
+        }
+    }
+
+    /// The cells of `point`, and those of its neighbours.
+    pub(super) fn cells(
+        &mut self,
+        mesh: &Mesh,
+        incidence: &Incidence,
+        moments: &CellMoments,
+        point: usize,
+    ) {
+        self.start(mesh, incidence, point);
+        let stamp = point as u32;
+        let centre = incidence.same[point] as usize;
+        self.ids.clear();
+        let mut ring = std::mem::take(&mut self.ring);
+        ring.clear();
+        ring.push(centre as u32);
+        let mut first = 0;
+        for step in 1..=MOST_STEPS {
+            let last = ring.len();
+            for i in first..last {
+                for &cell in incidence.cells.row(ring[i] as usize) {
+                    if std::mem::replace(&mut self.seen_cells[cell as usize], stamp) == stamp {
+                        continue;
+                    }
+                    if moments.is_sound(cell as usize) && self.ids.len() < MOST {
+                        self.ids.push(cell);
+                    }
+                    for &id in incidence.corners.row(cell as usize) {
+                        let seen = &mut self.seen_points[id as usize];
+                        if std::mem::replace(seen, stamp) != stamp {
+                            ring.push(id);
+                        }
+                    }
+                }
+            }
+            first = last;
+            if step == 1 {
+                self.near = self.ids.len();
+            } else if self.ids.len() >= ENOUGH {
+                break;
+            }
+        }
+        self.ring = ring;
+    }
+
+    /// The mean square of the distances along and across the axes, of those within one step: xx,
+    /// xy, xz, yy, yz, zz. `own` is the part of a cell itself.
+    pub(super) fn spread(
+        &self,
+        distance: impl Fn(u32) -> DVec3,
+        own: impl Fn(u32) -> [f64; 6],
+    ) -> [f64; 6] {
+        let mut sum = [0.0; 6];
+        for &id in &self.ids[..self.near] {
+            let d = distance(id);
+            let products = [d.x * d.x, d.x * d.y, d.x * d.z, d.y * d.y, d.y * d.z, d.z * d.z];
+            for ((s, p), own) in sum.iter_mut().zip(products).zip(own(id)) {
+                *s += p + own;
+            }
+        }
+        sum.map(|s| s / self.near.max(1) as f64)
+    }
+}
