@@ -162,7 +162,7 @@ pub(super) struct Fit {
 
 impl Fit {
     /// A polynomial through the value of `point`.
-    pub(super) fn to_points(
+    pub(super) fn over_points(
         &mut self,
         mesh: &Mesh,
         values: &[f64],
@@ -188,7 +188,7 @@ impl Fit {
 
     /// A polynomial whose averages over the cells around `point` are near those of `cells`. `value`
     /// remains where none fits.
-    pub(super) fn to_cells(
+    pub(super) fn over_cells(
         &mut self,
         mesh: &Mesh,
         cells: &[f64],

@@ -88,7 +88,7 @@ impl<'a> PointField<'a> {
         let incidence = Incidence::of(mesh);
         let fit = |point: usize, around: &mut Neighbourhood, fit: &mut Fit| {
             around.points(mesh, &incidence, point);
-            fit.to_points(mesh, values, point, around)
+            fit.over_points(mesh, values, point, around)
         };
         PointField { values, expansions: fitted(mesh, fit) }
     }
@@ -100,7 +100,7 @@ impl<'a> PointField<'a> {
         let moments = CellMoments::of(mesh);
         let fit = |point: usize, around: &mut Neighbourhood, fit: &mut Fit| {
             around.cells(mesh, &incidence, &moments, point);
-            fit.to_cells(mesh, cells, &moments, values[point], point, around)
+            fit.over_cells(mesh, cells, &moments, values[point], point, around)
         };
         PointField { values, expansions: fitted(mesh, fit) }
     }
