@@ -15,8 +15,8 @@ const MORE: usize = 120;
 /// Equations for each unknown, at least.
 const EQUATIONS_PER_TERM: f64 = 1.25;
 
-/// Samples nearer than this, squared and in the frame, weigh as if they were there: a point twice in
-/// the mesh, or a cell around the point.
+/// Samples nearer than this, squared and in the frame, weigh as if they were there: a point twice
+/// in the mesh, or a cell around the point.
 const NEAREST_SQUARE: f64 = 0.2;
 
 /// A polynomial whose residual, as a part of the variation around the point, is below the first
@@ -300,7 +300,8 @@ fn share_of(residual: f64) -> f64 {
 /// A polynomial and how well it fits.
 ///
 /// Where it does not, half of the linear fit's gradient takes its place: the elements' mean of such
-/// lines has the mean slope at each point from both sides, so that a captured shock has no steps at the faces of its cells.
+/// lines has the mean slope at each point from both sides, so that a captured shock has no steps at
+/// the faces of its cells.
 struct Solution {
     /// The constant, and the coefficients of the monomials.
     coefficients: [f64; TERMS + 1],

@@ -166,7 +166,6 @@ fn gradients_have_no_steps_at_the_faces_of_cells() {
         ("tetrahedra", tetrahedra(32, waved(32, 0.03))),
     ] {
         let [linear, cubic] = Reconstruction::ALL.map(|r| error(&data, r));
-        println!("{name}: linear {linear:.2e}, cubic {cubic:.2e}");
         assert!(linear > 0.05, "{name}: {linear}");
         // Central differences of the lattice itself have an error of 2e-3 of the largest gradient.
         assert!(cubic < 1e-2 && cubic < 0.1 * linear, "{name}: {cubic}");
