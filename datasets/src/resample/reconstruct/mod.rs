@@ -34,8 +34,8 @@ use rayon::prelude::*;
 pub enum Reconstruction {
     /// By the linear, bilinear and trilinear functions of the cells. Gradients jump at the faces.
     Linear,
-    /// By polynomials of third degree, or limited gradients where none fits. Needs about 120 bytes for each
-    /// point of the mesh.
+    /// By polynomials of third degree, or limited gradients where none fits. Needs about 120 bytes
+    /// for each point of the mesh.
     #[default]
     Cubic,
 }
