@@ -5,8 +5,8 @@
 //! such a column.
 
 /// A column is left out when less than this share of its square is its own. Four points along a
-/// line leave 0.7 % of the third power as its own. Of three points that are not quite on a grid, less
-/// is left, and a coefficient that follows from that is noise.
+/// line leave 0.7 % of the third power as its own. Of three points that are not quite on a grid,
+/// less is left, and a coefficient that follows from that is noise.
 const OWN_SHARE: f64 = 1e-4;
 
 /// Sums of products of up to `N` columns and a right-hand side.
