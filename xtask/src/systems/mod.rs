@@ -1,8 +1,9 @@
 //! Other releases of Debian: `cargo xtask systems`, and the step `next-systems` of CI.
 //!
 //! A small system of the other release is made in `target/systems/SUITE` by debootstrap. The
-//! checkout and the build folder are mounted in it at their own paths, so the test programs that are
-//! built here run there as they are: against that release's VTK, Mesa, OpenGL programs and C++ compiler.
+//! checkout and the build folder are mounted in it at their own paths, so the test programs that
+//! are built here run there as they are: against that release's VTK, Mesa, OpenGL programs and
+//! C++ compiler.
 //!
 //! What a suite installs and runs is a list in [`suites`]. Only tests that compare with stock
 //! programs are run; those of their files that are not run are printed by name.
