@@ -6,7 +6,7 @@
 //!
 //! Rays first need an acceleration structure, which a script that draws one image never gets back.
 //! So OpenGL draws until the model says that rays would have saved a part of its cost, and a
-//! decision changes only for a difference of a [`MARGIN`].
+//! decision changes only for a difference of a `MARGIN`.
 
 /// What the costs depend on.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
