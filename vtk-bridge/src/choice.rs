@@ -2,7 +2,8 @@
 //!
 //! Without effects the picture is VTK's own, so the cheaper way is the better one. A model of both
 //! costs decides, never a clock: the same sequence of frames is always drawn in the same way. Its
-//! constants are CPU milliseconds measured with llvmpipe; a hardware driver is always cheaper.
+//! constants are CPU milliseconds measured with llvmpipe. A hardware driver is taken to be cheaper
+//! than rays on the processor, whatever the scene; that was not measured.
 //!
 //! Rays first need an acceleration structure, which a script that draws one image never gets back.
 //! So OpenGL draws until the model says that rays would have saved a part of its cost, and a
@@ -140,8 +141,8 @@ impl Choice {
         }
         let Costs { opengl, rays, .. } = Costs::of(&self.facts);
         if !self.facts.software {
-            return "OpenGL's driver is hardware, which is faster, and no effect needs rays \
-                    (RTV_ALWAYS_TRACE=1 traces)"
+            return "OpenGL's driver is hardware, which is taken to be faster, and no effect needs \
+                    rays (RTV_ALWAYS_TRACE=1 traces)"
                 .to_owned();
         }
         format!(

@@ -3,8 +3,8 @@
 //! run.
 //!
 //! The numbers are those of Mesa's llvmpipe 22.3 and of this crate on an AMD EPYC with AVX-512 (see
-//! `docs/src/gluray/speed.md`). Only their ratio matters, and it changes little from one processor
-//! to the next, because both sides are vector code on the same cores.
+//! `docs/src/gluray/speed.md`). Only their ratio matters. Other processors are taken to have the
+//! same, because both sides are vector code on the same cores; that was not measured.
 
 /// What the driver draws in a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

@@ -20,14 +20,13 @@ const EQUATIONS_PER_TERM: f64 = 1.25;
 const NEAREST_SQUARE: f64 = 0.2;
 
 /// A polynomial whose residual, as a part of the variation around the point, is below the first
-/// number is used as it is; from the second on, it is not used. Cubic polynomials leave some 0.3 of
-/// a step and 0.6 of noise, and less than 0.05 of a bell whose width is three cells.
+/// number is used as it is; from the second on, it is not used. Steps and noise leave more than the
+/// second, and a bell whose width is three cells less than the first (a test has both).
 const RESIDUAL: [f64; 2] = [0.1, 0.25];
 
 /// Four values along a line leave nothing of a cubic polynomial to judge it by, and cells around a
 /// point, or points at a border, are no more. The residual of the polynomial of second degree on
-/// the same values counts too, times this. It is 0.45 for averages on both sides of a step, and
-/// 0.03 for the bell.
+/// the same values counts too, times this.
 const QUADRATIC_SHARE: f64 = 0.7;
 
 /// Number of samples that limit a gradient: on a cubic grid, those that share a cell.
@@ -368,5 +367,53 @@ impl Solution {
         let linear = equations.solve(1 + TERMS_TO_DEGREE[1]);
         let gradient = DVec3::new(linear[1], linear[2], linear[3]);
         Some(Solution { coefficients, degree, gradient, residual, complete: known == TERMS })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rt_core::math::SplitMix64;
+
+    /// The residual of a field around a node of a cubic grid.
+    fn residual(f: impl Fn(DVec3) -> f64) -> f64 {
+        let centre = f(DVec3::ZERO);
+        let steps = -2..=2i32;
+        let places = steps.clone().flat_map(|i| {
+            steps.clone().flat_map({
+                let steps = steps.clone();
+                move |j| steps.clone().map(move |k| glam::IVec3::new(i, j, k).as_dvec3())
+            })
+        });
+        let mut samples: Vec<Sample> = places
+            .filter(|p| *p != DVec3::ZERO)
+            .map(|p| Sample {
+                square: p.length_squared(),
+                id: 0,
+                value: f(p) - centre,
+                place: p,
+                second: [0.0; 6],
+            })
+            .collect();
+        samples.sort_by(|a, b| a.square.total_cmp(&b.square));
+        Solution::of(within(&samples, NEAREST), 0.0, false).expect("enough samples").residual
+    }
+
+    #[test]
+    fn residuals_tell_steps_and_noise_from_a_bell_of_three_cells() {
+        let [whole, none] = RESIDUAL;
+        for x in [0.0, 1.0, 2.0, 3.0, 4.5] {
+            let bell = |p: DVec3| (-0.5 * (p + DVec3::X * x).length_squared() / 9.0).exp();
+            assert!(residual(bell) < whole, "{x} from the middle: {}", residual(bell));
+        }
+        for x in [-0.5, 0.5, 1.5] {
+            let step = |p: DVec3| f64::from(u8::from(p.x > x));
+            assert!(residual(step) > none, "a step at {x}: {}", residual(step));
+        }
+        let mut random = SplitMix64::new(1);
+        let noise = std::cell::RefCell::new(|| random.unit());
+        let all = (0..20).map(|_| residual(|_| noise.borrow_mut()()));
+        let least = all.fold(f64::INFINITY, f64::min);
+        assert!(least > none, "noise: {least}");
     }
 }

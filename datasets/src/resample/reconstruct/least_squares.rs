@@ -4,9 +4,9 @@
 //! its unknown is zero: on a plane repeated along its normal, the second power of the height is
 //! such a column.
 
-/// A column is left out when less than this share of its square is its own. Four points along a
-/// line leave 0.7 % of the third power as its own. Of three points that are not quite on a grid,
-/// less is left, and a coefficient that follows from that is noise.
+/// A column is left out when less than this share of its square is its own. Of the third power over
+/// three points that are not quite on a grid, little is left, and a coefficient that follows from
+/// that is noise.
 const OWN_SHARE: f64 = 1e-4;
 
 /// Sums of products of up to `N` columns and a right-hand side.

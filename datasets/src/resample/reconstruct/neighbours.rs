@@ -42,11 +42,11 @@ impl Incidence {
             let ids = if mesh.is_hidden(cell) { vec![] } else { mesh.corners(cell).ids };
             ids.into_iter().map(|id| same[id as usize]).collect::<Vec<u32>>()
         };
-        // In pieces, because a list for each cell takes four times the memory.
-        const PIECE: usize = 1 << 14;
+        // In pieces, because a list for each cell takes more memory than the rows.
+        const PIECE: usize = 1 << 18;
         let mut corners = Rows { starts: vec![0], values: vec![] };
-        for first in (0..mesh.num_cells()).step_by(16 * PIECE) {
-            let cells = first..mesh.num_cells().min(first + 16 * PIECE);
+        for first in (0..mesh.num_cells()).step_by(PIECE) {
+            let cells = first..mesh.num_cells().min(first + PIECE);
             let lists: Vec<Vec<u32>> = cells.into_par_iter().map(of_cell).collect();
             for list in lists {
                 corners.values.extend(&list);
