@@ -66,9 +66,10 @@ pub(crate) fn add_ambient_light(
         for (i, p) in points[start..end].iter().enumerate() {
             if in_blocks && i % LANES == 0 {
                 let block = &points[start + i..end.min(start + i + LANES)];
+                let at = PointBlock::gather(block);
                 dispatch!(
                     context.level,
-                    simd => ambient_block(simd, context, mean, block, &mut light)
+                    simd => ambient_block(simd, context, mean, &at, &mut light)
                 );
             }
             if !p.lit {
@@ -160,22 +161,21 @@ pub(crate) struct OcclusionBuffers {
     sky_rays: SkyRays,
 }
 
-/// [`ambient_at`] for one to sixteen points without parameters of their own.
+/// [`ambient_at`] for points without parameters of their own.
 #[inline(never)]
-fn ambient_block<S: Simd>(
+pub(super) fn ambient_block<S: Simd>(
     simd: S,
     context: &FrameContext<'_>,
     mean: &IrradianceCoefficients,
-    points: &[Point],
+    at: &PointBlock,
     out: &mut Rows3,
 ) {
     simd.vectorize(
         #[inline(always)]
         || {
-            let at = PointBlock::gather(points);
             let color = Vec3x16::load(simd, &at.color);
             let normal = Vec3x16::load(simd, &at.normal);
-            by_material(context, points, at.lit, |material, lanes| {
+            by_material(context, &at.instance, at.lit, |material, lanes| {
                 if supports(&material.model) {
                     let light = response_block::ambient(
                         simd,

@@ -194,3 +194,54 @@ fn occlusion_rays_of_many_points_are_those_of_single_points() {
         });
     }
 }
+
+/// All layers of the tiles of a frame, and counts of rays.
+fn tiles(
+    context: &FrameContext<'_>,
+    render: impl Fn(&TileArea, &mut TileLayers, &mut Workspace, &mut RayStats),
+) -> (Vec<String>, RayStats) {
+    let (mut work, mut stats, mut text) = (Workspace::default(), RayStats::default(), vec![]);
+    for tile in 0..TILES * TILES {
+        let [x, y] = [tile % TILES * TILE, tile / TILES * TILE];
+        let width = if tile % TILES == 2 { 13 } else { TILE };
+        let area = TileArea { x, y, width, height: TILE, sample: 0 };
+        let mut out = TileLayers::new(context.options.layers, 1.0, false);
+        render(&area, &mut out, &mut work, &mut stats);
+        let TileLayers { color, depth, distance, normal, instance, primitive, cost, .. } = &out;
+        for slot in (0..PIXELS).filter(|s| area.pixel(*s as u16).is_some()) {
+            let geometry = (depth[slot], distance[slot], normal[slot]);
+            let ids = (instance[slot], primitive[slot]);
+            text.push(format!("{:?} {geometry:?} {ids:?} {}", color[slot], cost[slot]));
+        }
+    }
+    (text, stats)
+}
+
+#[test]
+fn hard_shadows_in_blocks_of_pixels_have_the_bits_of_the_general_loop() {
+    let mut scene = shadow_scene();
+    scene.lights.retain(|l| !matches!(l.kind, LightKind::Disk { .. }));
+    scene.lights.push(Light { shadows: false, ..Light::point(DVec3::new(1.0, 2.0, 2.0)) });
+    let eye = DVec3::new(0.3, 0.5, 3.5);
+    let camera = Camera::perspective(eye, DVec3::ZERO, DVec3::Y, 0.6, 1.0, [0.1, 100.0]).unwrap();
+    let options =
+        RenderOptions { layers: Layers::ALL, ..RenderOptions::new(TILES * TILE, TILES * TILE) };
+    let (mut lit, mut unlit) = (0, 0);
+    for level in SimdLevel::available().into_iter().map(Some).chain([None]) {
+        let mut context = FrameContext::new(&scene, &camera, &options, Effects::SHADOWS);
+        context.level = SimdLevel::resolve(level).expect("a level of this machine");
+        assert!(local::is_sufficient(&context) && !local::has_no_effect(&context));
+        let (blocks, stats) = tiles(&context, |area, out, work, stats| {
+            local::render_tile(&context, area, out, work, None, true, stats);
+        });
+        let (general, expected) = tiles(&context, |area, out, work, stats| {
+            render_wavefronts(&context, area, out, work, 0, true, true, stats);
+        });
+        for (pixel, (a, b)) in blocks.iter().zip(&general).enumerate() {
+            assert_eq!(a, b, "pixel {pixel} at {level:?}");
+        }
+        assert_eq!(format!("{stats:?}"), format!("{expected:?}"), "at {level:?}");
+        (lit, unlit) = (stats.shadow - stats.shadow_blocked, stats.shadow_blocked);
+    }
+    assert!(lit > 1000 && unlit > 1000, "{lit} rays arrive and {unlit} do not");
+}

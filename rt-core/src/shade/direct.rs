@@ -5,6 +5,7 @@ use super::frame_context::FrameContext;
 pub(super) use super::light_sampling::LightSampling;
 use super::lobes::response;
 use super::point::{Maps, WithMaps, WithoutMaps};
+use super::point_block::PointBlock;
 use super::shadow::trace_light_rays;
 use super::wavefront::{LightRays, RayState};
 use super::{Point, SampleDimension, TileArea};
@@ -160,10 +161,10 @@ fn light_block(
     rays: &mut LightRays,
 ) {
     let from_light = traced.then(|| !context.light_passes_surfaces());
-    let errors = ShadowErrors { place_ulps: PLACE_ULPS, most_errors: MOST_ERRORS };
+    let at = PointBlock::gather(points);
     dispatch!(
         context.level,
-        simd => block.fill(simd, context, light, points, from_light, errors)
+        simd => block.fill(simd, context, light, &at, from_light, SHADOW_ERRORS)
     );
     let mut untested = if traced { 0 } else { block.lanes };
     if traced && light.follows_camera_rays {
@@ -303,6 +304,10 @@ const PLACE_ULPS: f32 = 4.0;
 /// A ray may start at the light if it ends at most this many error bounds of the surface before the
 /// surface.
 const MOST_ERRORS: f32 = 32.0;
+
+/// For blocks.
+pub(super) const SHADOW_ERRORS: ShadowErrors =
+    ShadowErrors { place_ulps: PLACE_ULPS, most_errors: MOST_ERRORS };
 
 /// The ray between a point and a light. `from_light` requests the light as its origin: all rays of
 /// a light then share the origin and are traced as one packet.

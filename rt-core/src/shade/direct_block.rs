@@ -6,7 +6,6 @@
 
 use super::frame_context::FrameContext;
 use super::lobes::response;
-use super::point::Point;
 use super::point_block::{PointBlock, by_material};
 use super::response_block::{Lobe, incident, length, respond, supports};
 use crate::light::{ResolvedLight, ResolvedLightKind};
@@ -49,21 +48,21 @@ impl LightBlock {
         LightBlock { radiance: Rows3::ZERO, lanes: 0, rays: RayBlock::INACTIVE }
     }
 
-    /// Light of `light`, which is [known](knows), at one to sixteen points. `rays`, if any rays are
-    /// needed, says whether they may start at the light.
+    /// Light of `light`, which is [known](knows), at the points that are lit. `rays`, if any rays
+    /// are needed, says whether they may start at the light.
     #[inline(never)]
     pub(super) fn fill<S: Simd>(
         &mut self,
         simd: S,
         context: &FrameContext<'_>,
         light: &ResolvedLight,
-        points: &[Point],
+        at: &PointBlock,
         rays: Option<bool>,
         errors: ShadowErrors,
     ) {
         simd.vectorize(
             #[inline(always)]
-            || self.fill_body(simd, context, light, points, rays, errors),
+            || self.fill_body(simd, context, light, at, rays, errors),
         );
     }
 
@@ -73,11 +72,10 @@ impl LightBlock {
         simd: S,
         context: &FrameContext<'_>,
         light: &ResolvedLight,
-        points: &[Point],
+        at: &PointBlock,
         rays: Option<bool>,
         errors: ShadowErrors,
     ) {
-        let at = PointBlock::gather(points);
         self.lanes = 0;
         if at.lit == 0 {
             return;
@@ -88,7 +86,7 @@ impl LightBlock {
         let normal = Vec3x16::load(simd, &at.normal);
         let view = Vec3x16::load(simd, &at.view);
         let mut sum = Vec3x16::splat(simd, Vec3::ZERO);
-        by_material(context, points, at.lit, |material, lanes| {
+        by_material(context, &at.instance, at.lit, |material, lanes| {
             let of_this = mask32x16::from_bitmask(simd, lanes as u64);
             let answer = if supports(&material.model) {
                 respond(simd, Lobe::of(&material.model), color, normal, view, dir, light)
@@ -116,7 +114,7 @@ impl LightBlock {
             | sum.x.simd_eq(zero) & sum.y.simd_eq(zero) & sum.z.simd_eq(zero);
         self.lanes = at.lit & !(dark.to_bitmask() as u16);
         if let Some(from_light) = rays {
-            shadow_rays(simd, &at, dir, light, from_light, errors, &mut self.rays);
+            shadow_rays(simd, at, dir, light, from_light, errors, &mut self.rays);
         }
     }
 }

@@ -5,7 +5,8 @@
 //! the frame's [`Effects`] include it: [`direct`] light with its shadow rays,
 //! [`ambient_occlusion`], then [`specular`] (mirror, gloss, glass) or [`path`] and transparency,
 //! which spawn rays for the next wavefronts. Rays behind transparent surfaces stay coherent and
-//! form a separate wavefront. Frames without any of these effects use a separate loop, [`local`].
+//! form a separate wavefront. Frames without any of these effects, or with hard shadows alone, use
+//! loops of their own, [`local`].
 
 mod ambient_occlusion;
 #[cfg(test)]
@@ -90,6 +91,7 @@ pub(crate) struct Workspace {
     parameters: Vec<SurfaceParameters>,
     light_rays: LightRays,
     occlusion: ambient_occlusion::OcclusionBuffers,
+    shadows: local::ShadowBuffers,
     /// For each ray, what it collects in the volume up to its hit, where other processes hold the
     /// volume's bricks; empty where the whole volume is here.
     volume_samples: Vec<crate::volume::VolumeSample>,
@@ -125,14 +127,30 @@ pub(crate) fn render_tile(
     if local::is_sufficient(context) {
         let jittered = (!centered).then_some(sample);
         local::render_tile(context, area, out, work, jittered, record, &mut stats);
-        return stats;
+    } else {
+        render_wavefronts(context, area, out, work, sample, centered, record, &mut stats);
     }
+    stats
+}
+
+/// As [`render_tile`], with any effects. With `centered`, camera rays go through pixels' centres;
+/// with `record`, they fill the geometry layers.
+fn render_wavefronts(
+    context: &FrameContext<'_>,
+    area: &TileArea,
+    out: &mut TileLayers,
+    work: &mut Workspace,
+    sample: u32,
+    centered: bool,
+    record: bool,
+    stats: &mut RayStats,
+) {
     generate_camera_wavefront(
         context,
         area,
         &mut work.current,
         (!centered).then_some(sample),
-        &mut stats,
+        stats,
         out.cost_mut(),
     );
     if sample == 0 {
@@ -152,9 +170,9 @@ pub(crate) fn render_tile(
         if std::mem::take(&mut record_all) {
             record_camera_hits(context, &area_sample, out, work);
         }
-        process_hits(context, &area_sample, out, work, record, &mut stats);
-        shade_points(context, &area_sample, out, work, &mut stats);
-        spawn_rays(context, &area_sample, out, work, &mut stats);
+        process_hits(context, &area_sample, out, work, record, stats);
+        shade_points(context, &area_sample, out, work, stats);
+        spawn_rays(context, &area_sample, out, work, stats);
         coherent = !work.behind.is_empty();
         let next = if coherent { &mut work.behind } else { &mut work.scattered };
         if next.is_empty() {
@@ -168,7 +186,6 @@ pub(crate) fn render_tile(
     } else {
         out.add_sample(&work.pixels);
     }
-    stats
 }
 
 fn trace(context: &FrameContext<'_>, work: &mut Workspace, coherent: bool) {

@@ -4,7 +4,7 @@ use super::FrameContext;
 use super::response_block::length;
 use crate::ray::{HitBlock, LANES, NO_HIT, RayBlock};
 use crate::simd::vectors::{Row, Vec3x16};
-use crate::surface::{SurfacePoint, SurfacePointBlock};
+use crate::surface::{ExactRows, ShadingPointBlock, SurfacePoint, SurfacePointBlock};
 use fearless_simd::{Simd, SimdBase, dispatch, f32x16};
 
 /// Surfaces at the hits of a block.
@@ -31,6 +31,12 @@ impl BlockSurfaces {
     #[inline(always)]
     pub(super) fn get(&self, lane: usize) -> SurfacePoint {
         self.points.get(lane)
+    }
+
+    /// All surfaces, one row per component.
+    #[inline(always)]
+    pub(super) fn rows(&self) -> (&ShadingPointBlock, &ExactRows) {
+        self.points.rows()
     }
 
     /// Looks up the surfaces of all hits, or only the rays' lengths where the surfaces are known.

@@ -53,11 +53,11 @@ impl ShadingPointBlock {
 
 /// What a [`super::SurfacePoint`] has beyond a shading point.
 #[repr(C, align(64))]
-pub(super) struct ExactRows {
-    pub(super) point: Rows3,
+pub(crate) struct ExactRows {
+    pub(crate) point: Rows3,
     /// Before orientation: unit normals that point outwards.
-    pub(super) face_normal: Rows3,
-    pub(super) point_error: Row,
+    pub(crate) face_normal: Rows3,
+    pub(crate) point_error: Row,
     /// Bit per lane.
     pub(super) outside: u16,
 }

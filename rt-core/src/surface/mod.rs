@@ -11,7 +11,7 @@ mod block;
 mod parameters;
 mod point_block;
 
-pub(crate) use block::{Planes, ShadingPointBlock};
+pub(crate) use block::{ExactRows, Planes, ShadingPointBlock};
 pub(crate) use point_block::SurfacePointBlock;
 
 use crate::bvh::Geometry;

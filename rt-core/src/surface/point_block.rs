@@ -30,6 +30,12 @@ impl SurfacePointBlock {
         SurfacePointBlock { shading: ShadingPointBlock::new(), exact: ExactRows::new() }
     }
 
+    /// Normals, colours and opacities, and what rays that start here need.
+    #[inline(always)]
+    pub(crate) fn rows(&self) -> (&ShadingPointBlock, &ExactRows) {
+        (&self.shading, &self.exact)
+    }
+
     pub(crate) fn set(&mut self, lane: usize, s: &SurfacePoint) {
         let SurfacePointBlock { shading, exact } = self;
         exact.point.set(lane, s.point);

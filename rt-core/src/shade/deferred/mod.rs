@@ -207,7 +207,7 @@ impl<'a> DeferredFrame<'a> {
     /// True when colours need nothing but camera rays. [`CameraHits::colors`] then computes the
     /// colours of the hits, and [`TileState::select_colors`] takes those of the closest.
     pub fn needs_only_local_light(&self) -> bool {
-        local::is_sufficient(&self.context)
+        local::has_no_effect(&self.context)
     }
 
     /// True when [`Pass::Color`] also fills the geometry layers, from the hits passed to

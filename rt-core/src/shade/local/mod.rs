@@ -1,5 +1,5 @@
-//! Renders frames that need nothing but camera rays: trace, look up, light. It keeps no wavefronts,
-//! ray states or points.
+//! Renders frames that need nothing but camera rays, or these and hard shadows ([`shadows`]): trace,
+//! look up, light. It keeps no wavefronts, ray states or points.
 //!
 //! The lights and lobes are those of the general loop, computed for sixteen pixels at a time. Half
 //! of the time besides tracing was waiting for vertices (measured on a million triangles, one after
@@ -8,6 +8,9 @@
 
 mod elsewhere;
 mod light;
+mod shadows;
+
+pub(super) use shadows::ShadowBuffers;
 
 use super::direct::incident_from;
 use super::frame_context::FrameContext;
@@ -29,8 +32,13 @@ use crate::surface::{HitPoint, ShadingPoint, ShadingPointBlock, WithPoint, Witho
 use fearless_simd::{Simd, dispatch};
 use glam::Vec3;
 
-/// True when the frame has no effect other than the lens.
+/// True when the frame has no effect other than the lens and hard shadows.
 pub(super) fn is_sufficient(context: &FrameContext<'_>) -> bool {
+    has_no_effect(context) || shadows::is_sufficient(context)
+}
+
+/// True when the frame has no effect other than the lens.
+pub(super) fn has_no_effect(context: &FrameContext<'_>) -> bool {
     context.effects.without(Effects::DEPTH_OF_FIELD).is_empty()
 }
 
@@ -64,7 +72,11 @@ pub(super) fn render_tile(
         }
         elsewhere::move_hits(context, area, &mut work.current.blocks, &mut work.hits);
     }
-    light(context, area, out, work, &mut pixels, record, stats);
+    if has_no_effect(context) {
+        light(context, area, out, work, &mut pixels, record, stats);
+    } else {
+        shadows::light(context, area, out, work, &mut pixels, record, stats);
+    }
     if first {
         out.start_samples(pixels);
     } else {
