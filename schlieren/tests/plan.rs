@@ -281,3 +281,69 @@ fn coarse_lattices_do_not_ask_for_short_steps() {
     assert!(plan.bounds.interpolation_rad > 1e-9 && plan.step_voxels >= 0.5, "{plan:?}");
     assert!(Plan::new(&field, request(0.0)).step_voxels < plan.step_voxels);
 }
+
+/// Largest deflection error of the spline, and its estimate, in a cube with `nodes` per side.
+fn resolution(nodes: usize, eps: Eps, view: View) -> [f64; 2] {
+    let field = cube(nodes, eps);
+    let starts = grid(15, 0.999);
+    let truths: Vec<_> = starts.iter().map(|s| truth(eps, &view, s)).collect();
+    let finest = Request {
+        mode: Some(Mode::Full),
+        interpolant: Some(Interpolant::BSpline),
+        step_voxels: Some(0.25),
+        ..request(0.0)
+    };
+    let plan = Plan::new(&field, finest);
+    let error = errors(&*plan.paths(&field, view), &starts, &truths)[0];
+    [error, plan.measure(&field, view, 400).resolution_rad]
+}
+
+#[test]
+fn the_error_of_a_lattice_is_estimated_within_its_order_of_magnitude() {
+    let wall_layer: Eps = |p| 1e-4 * (-(p.y + 0.5) / 0.06).exp();
+    let small_blob: Eps = |p| 1e-4 * (-p.length_squared() / (2.0 * 0.04 * 0.04)).exp();
+    let waves: Eps = |p| 1e-5 * (25.0 * (p.x + 0.3 * p.y)).sin();
+    for (name, eps) in [
+        ("shear layer", FLOWS[3].1),
+        ("blob", FLOWS[5].1),
+        ("wall layer", wall_layer),
+        ("small blob", small_blob),
+        ("waves", waves),
+    ] {
+        // Lattices with an odd number of nodes have a half, those with an even number have none.
+        for nodes in [40, 41] {
+            for view in [View::along(Axis::Z, DVec3::ZERO), oblique()] {
+                let [error, estimate] = resolution(nodes, eps, view);
+                let ratio = estimate / error;
+                assert!(
+                    (0.5..12.0).contains(&ratio),
+                    "{name}, {nodes} nodes, {:?}: {estimate:.1e} for {error:.1e}",
+                    view.forward
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn what_a_lattice_has_exactly_is_not_called_unresolved() {
+    let linear: Eps = |p| 1e-4 * (p.x + 2.0 * p.y);
+    for nodes in [40, 41] {
+        let field = cube(nodes, linear);
+        let view = View::along(Axis::Z, DVec3::ZERO);
+        let m = Plan::new(&field, request(1e-9)).measure(&field, view, 200);
+        assert!(m.resolution_rad < 1e-9, "{nodes} nodes: {m:?}");
+    }
+}
+
+/// Between two nodes a jump may be anywhere, and no interpolant knows where.
+#[test]
+fn jumps_from_node_to_node_are_not_underestimated() {
+    let jump: Eps = |p| if 0.8 * p.x + 0.6 * p.y + 0.03 > 0.0 { 5e-5 } else { -5e-5 };
+    for nodes in [40, 49] {
+        for view in [View::along(Axis::X, DVec3::ZERO), View::along(Axis::Z, DVec3::ZERO)] {
+            let [error, estimate] = resolution(nodes, jump, view);
+            assert!(estimate > 0.8 * error, "{nodes} nodes: {estimate:.1e} for {error:.1e}");
+        }
+    }
+}

@@ -2,15 +2,16 @@
 
 use super::{
     Interpolate, Interpolate16, LANES, Row, Sample, Samples, cell, cells16, prefilter_line,
-    transpose, trilinear::padded_row,
+    prefilter_rows, transpose, trilinear::padded_row,
 };
 use crate::field::Field;
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x8, f32x16};
 use rayon::prelude::*;
 
-/// The natural cubic spline through the nodes. Wherever the field is resolved, its error is
-/// hundreds of times smaller than that of trilinear gradients (Sigworth's rule of thumb).
+/// The cubic spline through the nodes, without a knot next to the faces. Wherever the field is
+/// resolved, its error is hundreds of times smaller than that of trilinear gradients (Sigworth's
+/// rule of thumb).
 #[derive(Debug)]
 pub struct BSpline {
     /// Coefficients of nodes -1 ..= n along each axis.
@@ -109,43 +110,6 @@ impl BSpline {
     pub(crate) fn coefficients(&self) -> (&[f32], [usize; 2]) {
         (&self.coefficients, self.stride)
     }
-}
-
-/// [`prefilter_line`] along the second axis of a plane. It does the same elimination row by row,
-/// for all columns at once.
-fn prefilter_rows(plane: &mut [f64], row: usize) {
-    let n = plane.len() / row - 2;
-    let pass = |plane: &mut [f64], out: usize, other: usize, f: &dyn Fn(f64, f64) -> f64| {
-        let (lo, hi) = plane.split_at_mut(row * out.max(other));
-        let (o, r) = if out > other {
-            (&mut hi[..row], &lo[row * other..row * (other + 1)])
-        } else {
-            (&mut lo[row * out..row * (out + 1)], &hi[..row])
-        };
-        for (a, b) in o.iter_mut().zip(r) {
-            *a = f(*a, *b);
-        }
-    };
-    // Values are in rows 1..=n; the first and the last of them stay unchanged.
-    let mut ratio = vec![0.0; n + 1];
-    let mut pivot = 4.0;
-    for i in 2..n {
-        if i > 2 {
-            ratio[i] = 1.0 / pivot;
-            pivot = 4.0 - ratio[i];
-        }
-        let rcp = 1.0 / pivot;
-        pass(plane, i, i - 1, &|v, before| (6.0 * v - before) * rcp);
-    }
-    ratio[n] = 1.0 / pivot;
-    for i in (2..n).rev() {
-        let r = ratio[i + 1];
-        pass(plane, i, i + 1, &|v, after| v - r * after);
-    }
-    pass(plane, 0, 1, &|_, b| 2.0 * b);
-    pass(plane, 0, 2, &|a, b| a - b);
-    pass(plane, n + 1, n, &|_, b| 2.0 * b);
-    pass(plane, n + 1, n - 1, &|a, b| a - b);
 }
 
 /// Weights of the four coefficients around a cell at position `t` in 0..1, and of their three

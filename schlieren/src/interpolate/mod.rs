@@ -10,13 +10,15 @@
 //! outside the lattice get the value and the gradient of the nearest point on its surface.
 
 mod bspline;
+mod lagrange;
 mod prefilter;
 mod trilinear;
 mod trilinear_gradient;
 
 pub use bspline::BSpline;
 pub(crate) use bspline::{weights as bspline_weights, weights16 as bspline_weights16};
-pub(crate) use prefilter::prefilter_line;
+pub(crate) use lagrange::Lagrange;
+pub(crate) use prefilter::{prefilter_line, prefilter_rows};
 pub use trilinear::Trilinear;
 pub(crate) use trilinear::TrilinearRows;
 pub use trilinear_gradient::TrilinearGradient;

@@ -258,8 +258,8 @@ fn lattice_axis(d: DVec3) -> Option<(usize, f64)> {
     (0..3).all(|o| o == c || a[o] == 0.0).then_some((c, a[c]))
 }
 
-/// Weights of a line's values in the integral of the natural spline through them, in steps. They
-/// are 1 inside and less near the ends.
+/// Weights of a line's values in the integral of the spline through them, in steps. They are 1
+/// inside and other numbers near the ends.
 fn integral_weights(n: usize) -> Vec<f64> {
     // Integrals of the coefficients' basis functions between the first and the last node.
     let basis = |i: usize| {

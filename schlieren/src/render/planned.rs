@@ -35,26 +35,7 @@ impl<'a> PlannedPaths<'a> {
         tolerance_rad: f64,
         (bend, step_voxels): (Bend, f64),
     ) -> PlannedPaths<'a> {
-        let mut warnings = Vec::new();
-        if let Some(a) = achieved.filter(|a| a.max_rad > tolerance_rad) {
-            warnings.push(format!(
-                "deflections are off by up to {:.1e} rad, above the tolerance of \
-                 {tolerance_rad:.1e} rad; the flow has structures that its lattice does not \
-                 resolve: smooth shocks (flow.smoothing_nodes) or use a finer lattice",
-                a.max_rad
-            ));
-        }
-        if let Some(a) =
-            achieved.filter(|a| a.resolution_rad.is_finite() && a.resolution_rad > tolerance_rad)
-        {
-            warnings.push(format!(
-                "the flow's own lattice limits deflections to about {:.1e} rad, above the \
-                 tolerance of {tolerance_rad:.1e} rad, with any march: use a finer lattice, \
-                 smoother shocks (flow.smoothing_nodes) or a larger tolerance \
-                 (march.tolerance_rad)",
-                a.resolution_rad
-            ));
-        }
+        let warnings = achieved.map_or(Vec::new(), |a| accuracy_warnings(&a, tolerance_rad));
         PlannedPaths {
             paths,
             description,
@@ -84,6 +65,44 @@ impl<'a> PlannedPaths<'a> {
     }
 }
 
+/// What keeps the deflections from the tolerance, with cures.
+fn accuracy_warnings(achieved: &MeasuredError, tolerance_rad: f64) -> Vec<String> {
+    let MeasuredError { max_rad, resolution_rad, .. } = *achieved;
+    let mut warnings = Vec::new();
+    if max_rad > tolerance_rad {
+        let [error, tolerance] = told_apart(max_rad, tolerance_rad);
+        let cause = if resolution_rad > tolerance_rad {
+            "the flow has structures that its lattice does not resolve: smooth shocks \
+             (flow.smoothing_nodes) or use a finer lattice"
+        } else {
+            "the lattice resolves the flow, so the march is too coarse or at the end of its digits: \
+             leave its method, interpolant and step to the plan, or use a larger tolerance \
+             (march.tolerance_rad)"
+        };
+        warnings.push(format!(
+            "deflections are off by up to {error} rad, above the tolerance of {tolerance} rad; \
+             {cause}"
+        ));
+    }
+    if resolution_rad.is_finite() && resolution_rad > tolerance_rad {
+        let [error, tolerance] = told_apart(resolution_rad, tolerance_rad);
+        warnings.push(format!(
+            "the flow's own lattice limits deflections to about {error} rad, above the tolerance \
+             of {tolerance} rad, with any march: use a finer lattice, smoother shocks \
+             (flow.smoothing_nodes) or a larger tolerance (march.tolerance_rad)"
+        ));
+    }
+    warnings
+}
+
+/// Two different numbers with as many digits as tell them apart, two at least.
+fn told_apart(a: f64, b: f64) -> [String; 2] {
+    (1..16)
+        .map(|digits| [a, b].map(|x| format!("{x:.digits$e}")))
+        .find(|[a, b]| a != b)
+        .unwrap_or_else(|| [a, b].map(|x| format!("{x:e}")))
+}
+
 pub(super) fn described(name: &str, interpolant: Interpolant, step_voxels: f64) -> String {
     let interpolant = match interpolant {
         Interpolant::BSpline => "b-spline",
@@ -93,5 +112,27 @@ pub(super) fn described(name: &str, interpolant: Interpolant, step_voxels: f64) 
     match name {
         "line-of-sight" => format!("line-of-sight, {interpolant}"),
         _ => format!("{name}, {interpolant}, steps of {step_voxels} voxel"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn warnings(max_rad: f64, resolution_rad: f64) -> Vec<String> {
+        accuracy_warnings(&MeasuredError { max_rad, rms_rad: 0.0, resolution_rad, rays: 400 }, 1e-7)
+    }
+
+    #[test]
+    fn warnings_do_not_contradict_themselves() {
+        let both = warnings(1.004e-7, 1.0003e-7);
+        assert!(both[0].contains("1.004e-7 rad, above the tolerance of 1.000e-7 rad"), "{both:?}");
+        assert!(both[1].contains("1.0003e-7 rad, above the tolerance of 1.0000e-7"), "{both:?}");
+        // Where the lattice resolves the flow, smoothing it would not help.
+        let march = warnings(2e-7, 8e-9);
+        assert!(march.len() == 1 && !march[0].contains("smooth"), "{march:?}");
+        let lattice = warnings(2e-7, 3e-7);
+        assert!(lattice.len() == 2 && lattice[0].contains("smooth shocks"), "{lattice:?}");
+        assert!(warnings(1e-7, 1e-7).is_empty() && warnings(9e-8, f64::INFINITY).is_empty());
     }
 }
