@@ -1,6 +1,8 @@
 //! Writes images to files: PNG for viewing, OpenEXR with every layer and parameter, and NumPy for
 //! the deflection map.
 
+#[cfg(doc)]
+use crate::render::Map;
 use crate::render::RenderOutput;
 use crate::scene::{Scene, SceneError};
 use datasets::image_io::{self, ImageError, LayeredImage, Metadata, PngDepth, PngReport, keys};
@@ -43,7 +45,7 @@ pub fn write_png(path: &Path, rendered: &RenderOutput) -> Result<PngReport, Outp
 /// |---|---|---|
 /// | `R` `G` `B`, or `Y` | | the image, linear |
 /// | `deflection.X` `.Y` | rad | along the image's right and up |
-/// | `displacement.X` `.Y` | m | in the plane of focus, in the test section |
+/// | `displacement.X` `.Y` | m | of the ray in the plane of focus, in the test section; for BOS, of the background's dots, at their undisturbed places: [`Map::apparent_m`] |
 /// | `phase.Y` | waves | in the plane of focus |
 /// | `transmission.Y` | | 1 free, 0 blocked |
 /// | `samples.Y` | photons | landed on the pixel |
@@ -74,7 +76,9 @@ pub fn layers(rendered: &RenderOutput) -> Result<LayeredImage, OutputError> {
         for (axis, name) in ["X", "Y"].into_iter().enumerate() {
             let of = |v: &[[f32; 2]]| v.iter().map(|d| d[axis]).collect();
             image.add(&format!("deflection.{name}"), "rad", of(&m.deflection_rad))?;
-            image.add(&format!("displacement.{name}"), "m", of(&m.displacement_m))?;
+            let dots = !m.apparent_m.is_empty();
+            let displacement = if dots { &m.apparent_m } else { &m.displacement_m };
+            image.add(&format!("displacement.{name}"), "m", of(displacement))?;
         }
         if !m.waves.is_empty() {
             image.add("phase.Y", "waves", m.waves.clone())?;

@@ -10,8 +10,13 @@ use crate::path::{Exit, LightPaths, Status};
 pub struct Map {
     /// Deflection along right and up; 0 where no light arrives.
     pub deflection_rad: Vec<[f32; 2]>,
-    /// Displacement in the plane of focus, which BOS measures when that plane is the background.
+    /// Shift of the ray in the plane of focus: where it seems to come from, or for BOS, where a ray
+    /// from the camera hits the background, minus where it would without a flow.
     pub displacement_m: Vec<[f32; 2]>,
+    /// For BOS, how far the dot that is at the pixel without a flow seems to move, along right and
+    /// up: what correlating the image with the undisturbed one finds, with its sign. NaN where the
+    /// dot is not seen. Empty for other techniques.
+    pub apparent_m: Vec<[f32; 2]>,
     /// Optical path difference in the plane of focus, in waves; empty unless wanted.
     pub waves: Vec<f32>,
     /// Transmission: 1 for free rays, 0 for blocked ones.

@@ -21,6 +21,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod apparent;
 mod expose;
 pub(crate) mod map;
 mod media;
@@ -375,7 +376,10 @@ fn add_map(scene: &Scene, section: &TestSection, planned: &PlannedPaths<'_>, r: 
     let blocked = |s: &Start| section.solids.as_ref().is_some_and(|b| b.block(&section.view, s));
     let wavelength_m = scene.light.wavelengths_nm[0] * 1e-9;
     let n0 = section.fields[0].n0();
-    let m = map::map(&*planned.paths, &scene.optics(), &r.framing, wavelength_m, n0, blocked);
+    let mut m = map::map(&*planned.paths, &scene.optics(), &r.framing, wavelength_m, n0, blocked);
+    if matches!(scene.technique, TechniqueSpec::Bos { .. }) {
+        m.apparent_m = apparent::displacements(&r.framing, &m.displacement_m, &m.transmission);
+    }
     let report = &mut r.report;
     if report.march.is_empty() {
         report.add_plan(planned);

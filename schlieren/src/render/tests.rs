@@ -276,3 +276,63 @@ fn a_device_that_failed_on_the_way_is_a_warning_of_the_image_reported_once() {
     let reversed = crate::technique::bos::ReversedPaths::new(Box::new(Failed(planned.paths)));
     assert!(reversed.device_warning().is_some_and(|t| t.contains("Lamp 9")));
 }
+
+/// Dots are followed from the picture without a flow to the picture with it, as correlation does.
+#[test]
+fn dots_of_the_background_move_as_the_displacement_map_says() {
+    let text = "[film]\nsize = [160, 120]\nfocus_m = 1.0\n[view]\ndirection = \"z\"\n\
+                [technique]\nkind = \"bos\"\n\
+                [sampling]\nmethod = \"photons\"\nsamples = 16\n";
+    let s = scene(text);
+    let layers = Layers { map: true, ..Layers::NONE };
+    let with = |slope: [f64; 2]| {
+        let field = Field::from_fn([33; 3], [3e-3; 3], DVec3::splat(-48e-3), 1.0, |p| {
+            // A lens and a prism: shifts that differ from place to place.
+            slope[0] * p.x + slope[1] * p.y + 0.5 * (slope[0] + slope[1]) * 5.0 * p.x * p.x
+        })
+        .unwrap();
+        let section = TestSection::of_fields(&s, vec![field], None).unwrap();
+        render(&s, &section, layers, &Control::default()).unwrap()
+    };
+    let still = with([0.0; 2]);
+    let moved = with([0.03, -0.015]);
+    let map = moved.map.as_ref().unwrap();
+    let width = moved.framing.width as usize;
+    let value = |r: &RenderOutput, x: usize, y: usize| f64::from(r.pixels[y * width + x][0]);
+    let mut compared = 0;
+    for (cx, cy) in [(50, 40), (80, 60), (110, 80), (60, 90)] {
+        // The window's best whole shift by squared differences.
+        let mut best = (f64::INFINITY, [0i64; 2]);
+        for sx in -12..=12i64 {
+            for sy in -12..=12i64 {
+                let mut sum = 0.0;
+                for y in cy - 12..cy + 12usize {
+                    for x in cx - 12..cx + 12usize {
+                        let (tx, ty) = (x as i64 + sx, y as i64 - sy);
+                        let d = value(&still, x, y) - value(&moved, tx as usize, ty as usize);
+                        sum += d * d;
+                    }
+                }
+                if sum < best.0 {
+                    best = (sum, [sx, sy]);
+                }
+            }
+        }
+        let said = map.apparent_m[cy * width + cx].map(|m| f64::from(m) / moved.framing.pixel_m);
+        for c in 0..2 {
+            let seen = best.1[c] as f64;
+            assert!((said[c] - seen).abs() < 0.8, "at {cx}, {cy}: {said:?} seen {best:?}");
+        }
+        compared += usize::from(said[0].abs() > 1.5 && said[1].abs() > 1.0);
+    }
+    assert!(compared >= 3, "{compared} windows moved");
+    // Just as far at the place where the dot is seen, and the other way.
+    let [x, y] = [80usize, 60];
+    let u = map.apparent_m[y * width + x].map(|m| f64::from(m) / moved.framing.pixel_m);
+    let at = [(x as f64 + u[0]).round() as usize, (y as f64 - u[1]).round() as usize];
+    let d = map.displacement_m[at[1] * width + at[0]];
+    for c in 0..2 {
+        let d = f64::from(d[c]) / moved.framing.pixel_m;
+        assert!((u[c] + d).abs() < 0.2, "{u:?} {d}");
+    }
+}
