@@ -71,7 +71,8 @@ pub(super) struct FlowArgs {
     /// Standard deviation of the smoothing of shocks, in nodes
     #[arg(long, value_name = "NODES")]
     smoothing: Option<f64>,
-    /// Role of nodes outside the mesh: blank, solid (a body) or gas (undisturbed flow)
+    /// Role of nodes outside the mesh: blank, solid (a body) or gas (undisturbed flow). gas with
+    /// --revolve, otherwise blank
     #[arg(long, value_name = "ROLE", value_parser = units::role)]
     outside: Option<Role>,
     /// Role of cells hidden by the solver: blank, solid or gas
@@ -120,7 +121,7 @@ impl FlowArgs {
         f.resample_samples = a.resample_samples.unwrap_or(f.resample_samples);
         f.reconstruction = a.reconstruction.unwrap_or(f.reconstruction);
         f.smoothing_nodes = a.smoothing.unwrap_or(f.smoothing_nodes);
-        f.outside = a.outside.unwrap_or(f.outside);
+        f.outside = a.outside.or(f.outside);
         f.hidden = a.hidden.unwrap_or(f.hidden);
         self.apply_curves(f)
     }

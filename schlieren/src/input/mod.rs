@@ -299,6 +299,12 @@ fn nodes_of(marks: &[Mark], options: &Options, report: &mut Report) -> Option<Ve
              (a body) or gas (undisturbed flow)"
         ));
     }
+    if outside > 0.0 && options.outside == Role::Gas {
+        report.warnings.push(format!(
+            "{outside:.1} % of the lattice lie outside the mesh and are taken as undisturbed flow; \
+             where a body is there, set --outside solid"
+        ));
+    }
     let bad = share(Mark::NotFinite);
     if bad > 0.0 {
         report

@@ -82,9 +82,10 @@ pub struct FlowSpec {
     /// Standard deviation of the smoothing of shocks, in nodes; 0 for none.
     #[serde(default)]
     pub smoothing_nodes: f64,
-    /// What the region outside the mesh is.
-    #[serde(default = "blank")]
-    pub outside: Role,
+    /// What the region outside the mesh is. When absent, it is undisturbed gas around a revolved
+    /// flow, which a box holds with its corners empty, and blank otherwise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub outside: Option<Role>,
     /// What cells hidden by the solver are.
     #[serde(default = "solid")]
     pub hidden: Role,
@@ -124,10 +125,6 @@ fn one_sample() -> usize {
     1
 }
 
-fn blank() -> Role {
-    Role::Blank
-}
-
 fn solid() -> Role {
     Role::Solid
 }
@@ -156,7 +153,7 @@ impl Default for FlowSpec {
             resample_samples: one_sample(),
             reconstruction: Reconstruction::default(),
             smoothing_nodes: 0.0,
-            outside: blank(),
+            outside: None,
             hidden: solid(),
             reference_n_minus_1: None,
         }
@@ -186,6 +183,11 @@ impl FlowSpec {
             hidden: self.hidden,
             ..FlowSpec::default()
         }
+    }
+
+    /// What the region outside the mesh is: as given, or the default.
+    pub fn outside_role(&self) -> Role {
+        self.outside.unwrap_or(if self.revolve { Role::Gas } else { Role::Blank })
     }
 
     /// The quantities that determine the index.
@@ -315,7 +317,7 @@ impl FlowSpec {
             samples_per_axis: self.resample_samples,
             reconstruction: self.reconstruction,
             smoothing_nodes: self.smoothing_nodes,
-            outside: self.outside,
+            outside: self.outside_role(),
             hidden: self.hidden,
             reference: self
                 .reference_n_minus_1
@@ -328,6 +330,14 @@ impl FlowSpec {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn around_a_revolved_flow_is_gas_unless_something_else_is_asked_for() {
+        let flow = |revolve, outside| FlowSpec { revolve, outside, ..FlowSpec::default() };
+        assert_eq!(flow(true, None).outside_role(), Role::Gas);
+        assert_eq!(flow(false, None).outside_role(), Role::Blank);
+        assert_eq!(flow(true, Some(Role::Solid)).outside_role(), Role::Solid);
+    }
 
     fn flow(text: &str) -> Result<Medium, String> {
         let spec: FlowSpec =
