@@ -17,14 +17,32 @@ Examples
 """
 
 from rt_core._rt_core import NO_HIT, count_threads
+from rt_core._pictures import (
+    Camera,
+    Isosurface,
+    Mesh,
+    Picture,
+    Spheres,
+    Tubes,
+    Volume,
+    render,
+)
 from rt_core._scene import AllHits, ClosestPoints, Hits, Scene
 
 __version__ = "0.1.0"
 __all__ = [
     "NO_HIT",
     "AllHits",
+    "Camera",
     "ClosestPoints",
     "Hits",
+    "Isosurface",
+    "Mesh",
+    "Picture",
     "Scene",
+    "Spheres",
+    "Tubes",
+    "Volume",
     "count_threads",
+    "render",
 ]

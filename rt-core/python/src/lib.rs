@@ -8,6 +8,7 @@
 mod methods;
 mod queries;
 mod rays;
+mod stage;
 mod work;
 mod world;
 
@@ -16,6 +17,8 @@ use pyo3::prelude::*;
 /// What `rt_core`'s Python files import.
 #[pymodule]
 mod _rt_core {
+    #[pymodule_export]
+    use super::stage::Stage;
     #[pymodule_export]
     use super::work::count_threads;
     #[pymodule_export]

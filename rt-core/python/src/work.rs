@@ -59,11 +59,16 @@ fn pool(_py: Python<'_>, threads: usize) -> PyResult<Arc<ThreadPool>> {
 
 /// Tells work whether to stop early.
 #[derive(Default)]
-pub(crate) struct Stop(AtomicBool);
+pub(crate) struct Stop(Arc<AtomicBool>);
 
 impl Stop {
     pub(crate) fn is_asked(&self) -> bool {
         self.0.load(Ordering::Relaxed)
+    }
+
+    /// The same, for who looks at it by themselves.
+    pub(crate) fn flag(&self) -> Arc<AtomicBool> {
+        Arc::clone(&self.0)
     }
 }
 
