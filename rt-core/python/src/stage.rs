@@ -36,7 +36,7 @@ impl<'py> Thing<'_, 'py> {
     }
 
     fn floats(&self, name: &str) -> PyResult<Option<Vec<f32>>> {
-        let array = self.maybe(name)?.map(|v| Ok::<Floats<'py>, PyErr>(v.extract()?));
+        let array: Option<PyResult<Floats<'py>>> = self.maybe(name)?.map(|v| v.extract());
         Ok(match array.transpose()? {
             Some(a) => Some(a.as_slice()?.to_vec()),
             None => None,
