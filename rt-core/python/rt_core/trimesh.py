@@ -16,10 +16,6 @@ import numpy as np
 
 from rt_core._scene import Scene
 
-# Surfaces closer to the start than this part of the mesh's size do not count: it is less than
-# float32 resolves, and rays that start on a surface are not to meet it.
-_NEAREST = 1e-8
-
 
 def install():
     """Makes trimesh use this module wherever it would use Embree.
@@ -39,6 +35,8 @@ def install():
 
 class RayMeshIntersector:
     """Ray queries of one mesh, with the methods of trimesh's class of this name.
+
+    As with Embree, a ray that starts on the surface meets it there.
 
     Parameters
     ----------
@@ -78,10 +76,6 @@ class RayMeshIntersector:
         numbers = np.flatnonzero(usable)
         return origins[usable], directions[usable] / lengths[usable], numbers, len(origins)
 
-    def _t_min(self):
-        bounds = self._scene.bounds
-        return 0.0 if bounds is None else _NEAREST * float(np.linalg.norm(bounds[1] - bounds[0]))
-
     def intersects_id(
         self,
         ray_origins,
@@ -109,15 +103,15 @@ class RayMeshIntersector:
             Only with `return_locations`.
         """
         origins, directions, numbers, _ = self._rays(ray_origins, ray_directions)
-        scene, t_min = self._scene, self._t_min()
+        scene = self._scene
         if multiple_hits:
-            hits = scene.all_hits(origins, directions, t_min=t_min)
+            hits = scene.all_hits(origins, directions)
             rays, t, triangles = hits.ray, hits.t, hits.primitive.astype(np.int64)
             rank = np.arange(len(t)) - hits.starts[rays]
             kept = rank < max_hits
             rays, t, triangles, uv = rays[kept], t[kept], triangles[kept], hits.uv[kept]
         else:
-            hits = scene.cast(origins, directions, t_min=t_min)
+            hits = scene.cast(origins, directions)
             rays = np.flatnonzero(hits.hit)
             t, triangles = hits.t[rays], hits.primitive[rays].astype(np.int64)
             uv = hits.uv[rays]
@@ -161,7 +155,7 @@ class RayMeshIntersector:
         """The first triangle of each ray, -1 for none."""
         origins, directions, numbers, count = self._rays(ray_origins, ray_directions)
         found = np.full(count, -1, dtype=np.int64)
-        hits = self._scene.cast(origins, directions, t_min=self._t_min())
+        hits = self._scene.cast(origins, directions)
         found[numbers[hits.hit]] = hits.primitive[hits.hit]
         return found
 
@@ -169,7 +163,7 @@ class RayMeshIntersector:
         """Whether each ray hits the mesh."""
         origins, directions, numbers, count = self._rays(ray_origins, ray_directions)
         found = np.zeros(count, dtype=bool)
-        found[numbers] = self._scene.occluded(origins, directions, t_min=self._t_min())
+        found[numbers] = self._scene.occluded(origins, directions)
         return found
 
     def contains_points(self, points):
