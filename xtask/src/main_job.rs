@@ -6,6 +6,7 @@
 //! are meaningless. The step checks that every experiment runs to its end.
 
 use crate::step::{Context, Outcome};
+use crate::wheels;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -27,6 +28,11 @@ pub(crate) fn run(context: &Context<'_>) -> Outcome {
     let mut command = Command::new(&bench);
     command.args(ARGUMENTS).current_dir(context.root);
     command.envs(context.peers.environment(context.options.require_peers));
+    if let Some(python) =
+        wheels::installed(&build_folder(context.root, crate::build_folder_named()))
+    {
+        command.env("RTSV_RT_CORE_PYTHON", python);
+    }
     match command.status() {
         Ok(status) if status.success() => Outcome::Passed,
         Ok(status) => Outcome::Failed(format!("the main job: {status}")),
