@@ -12,8 +12,10 @@ Examples
 >>> triangles = np.array([[0, 1, 2]], dtype=np.uint32)
 >>> scene = rt_core.Scene(vertices, triangles)
 >>> t, primitive, uv, normal = scene.cast([[0.25, 0.5, 3]], [[0, 0, -1]])
->>> t, primitive, uv, normal
-(array([3.]), array([0], dtype=uint32), array([[0.25, 0.5 ]], dtype=float32), array([[0., 0., 1.]], dtype=float32))
+>>> t, primitive, uv
+(array([3.]), array([0], dtype=uint32), array([[0.25, 0.5 ]], dtype=float32))
+>>> normal
+array([[0., 0., 1.]], dtype=float32)
 """
 
 from rt_core._rt_core import NO_HIT, count_threads

@@ -18,6 +18,7 @@ Examples
 
 import numpy as np
 
+from rt_core import _arrays
 from rt_core._rt_core import NO_HIT
 from rt_core._scene import Scene
 
@@ -68,9 +69,6 @@ class RaycastingScene:
         triangles = triangle_indices
         triangles = np.asarray(triangles.numpy() if hasattr(triangles, "numpy") else triangles)
         # Arguments are checked now, not when the tree is built.
-        Scene(vertices[:0], np.zeros((0, 3), np.uint32))
-        from rt_core import _arrays
-
         _arrays.vertices(vertices)
         _arrays.triangles(triangles, len(vertices))
         self._meshes.append((vertices, triangles))

@@ -11,7 +11,9 @@ from shapes import rays, sphere
 PROGRAM = os.environ.get("RTSV_RT_CORE_BITS")
 
 
-@pytest.mark.skipif(PROGRAM is None, reason="RTSV_RT_CORE_BITS names no program: see examples/bits.rs of rt-core")
+@pytest.mark.skipif(
+    PROGRAM is None, reason="RTSV_RT_CORE_BITS names no program: see rt-core's example bits"
+)
 @pytest.mark.parametrize("scale, shift", [(1, 0), (1e-3, 0), (1, 1000), (1e4, 1e6)])
 def test_python_has_the_bits_of_rust(scale, shift):
     vertices, triangles = sphere(48)
