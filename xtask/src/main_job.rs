@@ -6,12 +6,15 @@
 //! are meaningless. The step checks that every experiment runs to its end.
 
 use crate::step::{Context, Outcome};
-use crate::wheels;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Arguments of bench: none, which runs the quick form of every experiment.
 pub(crate) const ARGUMENTS: &[&str] = &[];
+
+/// The environment in the build folder that the step `wheels` installs the Python package in, with
+/// the packages that bench compares it with.
+pub(crate) const RT_CORE_PYTHON: &str = "wheels/adapted";
 
 /// Runs the program `bench` of the build folder.
 pub(crate) fn run(context: &Context<'_>) -> Outcome {
@@ -28,9 +31,9 @@ pub(crate) fn run(context: &Context<'_>) -> Outcome {
     let mut command = Command::new(&bench);
     command.args(ARGUMENTS).current_dir(context.root);
     command.envs(context.peers.environment(context.options.require_peers));
-    if let Some(python) =
-        wheels::installed(&build_folder(context.root, crate::build_folder_named()))
-    {
+    let build = build_folder(context.root, crate::build_folder_named());
+    let python = build.join(RT_CORE_PYTHON).join("bin/python");
+    if python.is_file() {
         command.env("RTSV_RT_CORE_PYTHON", python);
     }
     match command.status() {

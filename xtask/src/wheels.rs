@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::command::first_line_of;
+use crate::main_job;
 use crate::step::{Context, Outcome};
 
 const MATURIN: &str = "maturin==1.16.0";
@@ -22,8 +23,6 @@ const PYTHONS: &[&str] =
 /// What the adapters of the package are for. Debian's Python gets it, and the others test the
 /// package alone. Open3D is not here: its wheel has 400 MB.
 const ADAPTED: &[&str] = &["trimesh", "rtree", "scipy", "embreex", "pyvista"];
-/// The environment that has them, in the folder of this command; bench measures with it too.
-const ADAPTED_FOLDER: &str = "adapted";
 
 /// Seconds that the package takes to import beyond numpy, the least of five, and the packages
 /// that are installed beside it.
@@ -76,7 +75,7 @@ pub(crate) fn check(context: &Context<'_>) -> Outcome {
     if context.options.keep_machine {
         return Outcome::NotRun("it installs packages from PyPI, which was forbidden".to_owned());
     }
-    let build = crate::main_job::build_folder(context.root, crate::build_folder_named());
+    let build = main_job::build_folder(context.root, crate::build_folder_named());
     let options = WheelsOptions { profile: "dev".to_owned(), out: None };
     match run(context.root, &build, &options) {
         Ok(()) => Outcome::Passed,
@@ -122,8 +121,9 @@ pub(crate) fn run(root: &Path, build: &Path, options: &WheelsOptions) -> Result<
     for (python, version) in &found {
         println!("\n{version}: {python}");
         let adapted = *python == found[0].0;
-        let folder = if adapted { ADAPTED_FOLDER.to_owned() } else { version.replace(' ', "-") };
-        let venv = environment(&work.join(folder), python)?;
+        let other = || work.join(version.replace(' ', "-"));
+        let folder = if adapted { build.join(main_job::RT_CORE_PYTHON) } else { other() };
+        let venv = environment(&folder, python)?;
         pip(&venv, &[&wheel.display().to_string()])?;
         let program = venv.join("bin/python");
         run_it(Command::new(&program).args(["-c", FRESH]))?;
@@ -136,12 +136,6 @@ pub(crate) fn run(root: &Path, build: &Path, options: &WheelsOptions) -> Result<
         run_it(&mut tests)?;
     }
     Ok(())
-}
-
-/// The Python that `cargo xtask wheels` has installed the package in, with what it is measured
-/// against.
-pub(crate) fn installed(build: &Path) -> Option<PathBuf> {
-    Some(build.join("wheels").join(ADAPTED_FOLDER).join("bin/python")).filter(|p| p.is_file())
 }
 
 /// The interpreters of this machine that the wheel is for, one of each version.
