@@ -3,7 +3,8 @@
 //! The steps are a list in [`plan`]; [`runner`] runs them and prints their cost; [`tools`] checks
 //! the machine; [`peers`] finds and installs the third-party software that some tests compare with;
 //! [`licences`] checks what we link against; [`package`] checks what we publish; [`dist`] makes
-//! packages for machines without Rust; [`systems`] runs tests on other releases of Debian.
+//! packages for machines without Rust; [`systems`] runs tests on other releases of Debian;
+//! [`wheels`] makes and tests the Python package.
 
 mod command;
 mod dist;
@@ -16,6 +17,7 @@ mod runner;
 mod step;
 mod systems;
 mod tools;
+mod wheels;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -50,6 +52,12 @@ cargo xtask dist [--profile NAME] [--out FOLDER]
       --profile NAME    build with this profile of cargo's instead of `release`
       --out FOLDER      put them there instead of into target/dist
 
+cargo xtask wheels [--profile NAME] [--out FOLDER]
+    Makes the wheel and the source archive of the Python package rt_core, installs the wheel in \
+    fresh environments of every Python of 3.10 or later here, and runs its tests there.
+      --profile NAME    build with this profile of cargo's instead of `release`
+      --out FOLDER      put them there instead of into target/wheels/dist
+
 cargo xtask systems [--suite NAME] [--paraview] [--record]
     Makes a small system of another release of Debian in target/systems (as root), and runs the \
     comparisons with stock programs there.
@@ -76,6 +84,7 @@ enum Command {
     CiList,
     Dist(dist::DistOptions),
     Systems(systems::SystemsOptions),
+    Wheels(wheels::WheelsOptions),
     Test(TestOptions),
     Vtk { release: bool, install: Vec<String> },
 }
@@ -115,6 +124,7 @@ fn parse(args: &[String]) -> Result<Command, String> {
         "book" => no_options(Command::Book),
         "ci-list" => no_options(Command::CiList),
         "systems" => systems::SystemsOptions::parse(rest).map(Command::Systems),
+        "wheels" => wheels::WheelsOptions::parse(rest).map(Command::Wheels),
         "dist" => dist::DistOptions::parse(rest).map(Command::Dist),
         "test" => {
             let mut options = TestOptions::default();
@@ -152,8 +162,8 @@ fn parse(args: &[String]) -> Result<Command, String> {
             install: rest.iter().filter(|a| *a != "--release").cloned().collect(),
         }),
         other => Err(format!(
-            "no command `{other}`; there are test, setup, vtk, dist, systems, book, ci-list and \
-             help"
+            "no command `{other}`; there are test, setup, vtk, dist, wheels, systems, book, \
+             ci-list and help"
         )),
     }
 }
@@ -221,6 +231,16 @@ fn main() -> ExitCode {
         Ok(Command::Dist(options)) => {
             let build = main_job::build_folder(&workspace_root(), build_folder_named());
             match dist::run(&workspace_root(), &build, &options) {
+                Ok(()) => Exit::Success,
+                Err(message) => {
+                    eprintln!("error: {message}");
+                    Exit::StepFailed
+                }
+            }
+        }
+        Ok(Command::Wheels(options)) => {
+            let build = main_job::build_folder(&workspace_root(), build_folder_named());
+            match wheels::run(&workspace_root(), &build, &options) {
                 Ok(()) => Exit::Success,
                 Err(message) => {
                     eprintln!("error: {message}");

@@ -12,6 +12,10 @@ use std::process::Command;
 /// Arguments of bench: none, which runs the quick form of every experiment.
 pub(crate) const ARGUMENTS: &[&str] = &[];
 
+/// The environment in the build folder that the step `wheels` installs the Python package in, with
+/// the packages that bench compares it with.
+pub(crate) const RT_CORE_PYTHON: &str = "wheels/adapted";
+
 /// Runs the program `bench` of the build folder.
 pub(crate) fn run(context: &Context<'_>) -> Outcome {
     // A no-op after `build-tests`. When run alone, this step builds what it needs, with the
@@ -27,6 +31,11 @@ pub(crate) fn run(context: &Context<'_>) -> Outcome {
     let mut command = Command::new(&bench);
     command.args(ARGUMENTS).current_dir(context.root);
     command.envs(context.peers.environment(context.options.require_peers));
+    let build = build_folder(context.root, crate::build_folder_named());
+    let python = build.join(RT_CORE_PYTHON).join("bin/python");
+    if python.is_file() {
+        command.env("RTSV_RT_CORE_PYTHON", python);
+    }
     match command.status() {
         Ok(status) if status.success() => Outcome::Passed,
         Ok(status) => Outcome::Failed(format!("the main job: {status}")),

@@ -6,7 +6,7 @@
 //! dev profile, whose members are optimised.
 
 use crate::step::{Action, Step};
-use crate::{licences, main_job, package, systems, tools};
+use crate::{licences, main_job, package, systems, tools, wheels};
 
 const fn cargo(args: &'static [&'static str]) -> Action {
     Action::Cargo { args, env: &[] }
@@ -135,6 +135,12 @@ pub(crate) const STEPS: &[Step] = &[
         tells: "the comparisons with stock VTK and OpenGL programs pass on the next release of \
                 Debian too, where chroots are allowed",
         action: Action::Call(systems::check),
+    },
+    Step {
+        name: "wheels",
+        tells: "the Python package installs in fresh environments with numpy alone, and passes its \
+                tests and the examples of its documentation there",
+        action: Action::Call(wheels::check),
     },
     Step {
         name: "counters",

@@ -33,6 +33,7 @@ mod paraview;
 mod partition_view;
 mod pictures;
 mod program_ranks;
+mod python;
 mod shock_angles;
 mod smpi;
 mod speed_schlieren;
@@ -208,6 +209,12 @@ pub const ALL: &[Experiment] = &[
         chapter: 4,
         title: "Thousands of small meshes: rays and builds against one mesh and against Embree",
         run: many_meshes::run,
+    },
+    Experiment {
+        id: "python",
+        chapter: 4,
+        title: "Rays from Python: rt_core against trimesh with Embree, Open3D and PyVista",
+        run: python::run,
     },
     Experiment {
         id: "frames",

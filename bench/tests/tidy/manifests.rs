@@ -18,6 +18,7 @@ enum May {
 /// The allowed dependencies of ARCHITECTURE.md. A new line here is a decision; record it there.
 const ALLOWED_DEPENDENCIES: &[(&str, May, &[&str])] = &[
     ("rt-core", May::Use, &[]),
+    ("rt-core-python", May::Use, &["rt-core"]),
     ("datasets", May::Use, &["rt-core"]),
     ("schlieren", May::Use, &["rt-core", "datasets"]),
     ("composite", May::UseBehindAFeature, &["rt-core", "datasets"]),

@@ -136,8 +136,49 @@ impl World {
         instances: Vec<Instance>,
         options: &BuildOptions,
     ) -> Result<World, BuildError> {
+        World::from_slices_with(&UNWATCHED, meshes, instances, options)
+    }
+
+    /// As [`World::from_slices`]; tells `watch` how far it is and stops when told so, as
+    /// [`World::build_watched`] does.
+    ///
+    /// ```
+    /// use rt_core::bvh::BuildError;
+    /// use rt_core::mesh::MeshSlices;
+    /// use rt_core::prelude::*;
+    /// use std::ops::ControlFlow;
+    ///
+    /// let corners = [0., 0., 0., 1., 0., 0., 0., 1., 0.];
+    /// let mesh = MeshSlices::new(&corners, &[0, 1, 2]);
+    /// let placed = vec![Instance { geometry: 0, world_from_object: DAffine3::IDENTITY }];
+    /// let stop = |_| ControlFlow::Break(());
+    /// let options = BuildOptions::default();
+    /// let stopped = World::from_slices_watched(&[mesh], placed, &options, stop);
+    /// assert!(matches!(stopped, Err(BuildError::Cancelled)));
+    /// ```
+    ///
+    /// # Errors
+    /// As [`World::from_slices`], and [`BuildError::Cancelled`] when `watch` stopped the build.
+    pub fn from_slices_watched(
+        meshes: &[MeshSlices<'_>],
+        instances: Vec<Instance>,
+        options: &BuildOptions,
+        watch: impl FnMut(f64) -> ControlFlow<()> + Send,
+    ) -> Result<World, BuildError> {
+        let triangles: usize = meshes.iter().map(MeshSlices::num_triangles).sum();
+        let watch = OneAtATime::new(watch);
+        let progress = Progress::watched_by(&watch, triangles + instances.len());
+        World::from_slices_with(&progress, meshes, instances, options)
+    }
+
+    fn from_slices_with(
+        progress: &Progress<'_>,
+        meshes: &[MeshSlices<'_>],
+        instances: Vec<Instance>,
+        options: &BuildOptions,
+    ) -> Result<World, BuildError> {
         let facts = |m: &MeshSlices<'_>| Geometry::Slices(Arc::new(SliceFacts::of(m.triangles())));
-        let request = BuildRequest::new(options, &UNWATCHED);
+        let request = BuildRequest::new(options, progress);
         BuildRequest { slices: meshes, ..request }
             .build(meshes.iter().map(facts).collect(), instances)
     }
