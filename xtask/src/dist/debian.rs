@@ -30,7 +30,12 @@ fn link_of(program: &str) -> &str {
 }
 
 /// Makes the package of the tree in `out` and returns its path.
-pub(super) fn pack(tree: &Path, out: &Path, version: &str) -> Result<PathBuf, String> {
+pub(super) fn pack(
+    tree: &Path,
+    out: &Path,
+    version: &str,
+    maintainer: &str,
+) -> Result<PathBuf, String> {
     let name = format!("rtsv_{version}_amd64");
     let stage = out.join(&name);
     if stage.exists() {
@@ -52,7 +57,7 @@ pub(super) fn pack(tree: &Path, out: &Path, version: &str) -> Result<PathBuf, St
     let programs = PROGRAMS.iter().map(|p| tree.join("bin").join(p));
     let files = programs.chain(LIBRARIES.iter().map(|l| tree.join("lib").join(l)));
     let depends = depends::of(&files.collect::<Vec<_>>())?;
-    let control = control(version, &depends, kilobytes(&stage)?);
+    let control = control(version, maintainer, &depends, kilobytes(&stage)?);
     write(&stage.join("DEBIAN/control"), &control)?;
     println!("Depends: {depends}");
     let package = format!("{name}.deb");
@@ -107,10 +112,10 @@ fn page_of(page: &str) -> String {
 }
 
 /// The text of `DEBIAN/control`.
-fn control(version: &str, depends: &str, kilobytes: u64) -> String {
+fn control(version: &str, maintainer: &str, depends: &str, kilobytes: u64) -> String {
     format!(
         "Package: rtsv\nVersion: {version}\nArchitecture: amd64\nSection: science\nPriority: \
-         optional\nMaintainer: The project's founders <founders@example.org>\nInstalled-Size: \
+         optional\nMaintainer: {maintainer}\nInstalled-Size: \
          {kilobytes}\nDepends: {depends}\nSuggests: {SUGGESTS}\nDescription: {DESCRIPTION}\n"
     )
 }
@@ -143,7 +148,7 @@ mod tests {
 
     #[test]
     fn every_line_of_the_control_file_is_a_field_or_goes_on() {
-        let text = control("1.2.3", "libc6 (>= 2.34)", 5);
+        let text = control("1.2.3", "Somebody", "libc6 (>= 2.34)", 5);
         for line in text.lines() {
             let field = line.split_once(": ").is_some_and(|(name, value)| {
                 name.chars().all(|c| c.is_ascii_alphabetic() || c == '-') && !value.is_empty()

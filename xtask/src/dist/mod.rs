@@ -78,7 +78,9 @@ pub(crate) fn run(root: &Path, build: &Path, options: &DistOptions) -> Result<()
         return Err("packages are made on x86-64 Linux, where gluray runs".to_owned());
     }
     let read = |path: &str| read(&root.join(path));
-    let version = version(&read("Cargo.toml")?).ok_or("Cargo.toml: there is no version")?;
+    let manifest = read("Cargo.toml")?;
+    let version = version(&manifest).ok_or("Cargo.toml: there is no version")?;
+    let maintainer = first_author(&manifest).ok_or("Cargo.toml: there are no authors")?;
     let mut cargo = vec!["build", "--profile", &options.profile];
     MEMBERS.iter().for_each(|m| cargo.extend(["-p", m]));
     let program = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
@@ -99,7 +101,7 @@ pub(crate) fn run(root: &Path, build: &Path, options: &DistOptions) -> Result<()
     let mut tar = vec!["--sort=name", "--owner=0", "--group=0", "--numeric-owner"];
     tar.extend(["-czf", &tarball, &name]);
     run_in(&out, "tar", &tar)?;
-    let package = debian::pack(&tree, &out, &version)?;
+    let package = debian::pack(&tree, &out, &version, &maintainer)?;
     for file in [out.join(tarball), package] {
         let bytes = fs::metadata(&file).map_err(|e| format!("{}: {e}", file.display()))?.len();
         println!("{} ({:.1} MB)", file.display(), bytes as f64 / 1e6);
@@ -149,6 +151,14 @@ fn version(manifest: &str) -> Option<String> {
     let section = manifest.split_once("[workspace.package]")?.1;
     let line = section.lines().find_map(|l| l.strip_prefix("version = \""))?;
     Some(line.trim_end_matches('"').to_owned())
+}
+
+/// The first of the authors in `[workspace.package]`: who maintains the packages. The name stands
+/// as it is there, with an address only where the manifest has one.
+fn first_author(manifest: &str) -> Option<String> {
+    let section = manifest.split_once("[workspace.package]")?.1;
+    let line = section.lines().find_map(|l| l.strip_prefix("authors = [\""))?;
+    Some(line.split_once('"')?.0.to_owned()).filter(|author| !author.is_empty())
 }
 
 // ---- Files --------------------------------------------------------------------------------------
@@ -241,6 +251,16 @@ mod tests {
         let manifest = read(&crate::workspace_root().join("Cargo.toml")).expect("a manifest");
         let version = version(&manifest).expect("a version");
         assert!(version.split('.').count() == 3, "{version}");
+    }
+
+    #[test]
+    fn the_maintainer_is_the_manifests_author_and_no_placeholder() {
+        let manifest = read(&crate::workspace_root().join("Cargo.toml")).expect("a manifest");
+        let author = first_author(&manifest).expect("an author");
+        assert!(!author.contains("example."), "{author}");
+        let two = "[workspace.package]\nauthors = [\"A B <a@b.org>\", \"C\"]\n";
+        assert_eq!(first_author(two).as_deref(), Some("A B <a@b.org>"));
+        assert_eq!(first_author("[workspace.package]\nauthors = [\"\"]\n"), None);
     }
 
     #[test]
