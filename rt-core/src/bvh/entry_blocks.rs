@@ -5,7 +5,9 @@ use super::instance_filter::InstanceFilter;
 use super::layout::wide::{ChildRef, Unit};
 use super::query::{HitQuery, TriangleTest};
 use super::streams::{limits_of, merge_hits};
-use super::world::World;
+use super::traverse::single::{RaySetup, traverse_from};
+use super::traverse::tree_view::TreeView;
+use super::world::{InstanceAny, InstanceClosest, World};
 use crate::bvh::traverse::block_entries::BlockEntries;
 use crate::bvh::traverse::incoherent;
 use crate::ray::{HitBlock, LANES, NO_HIT, RayBlock};
@@ -52,6 +54,43 @@ impl<S: Simd, T: TriangleTest, Q: HitQuery> BlockEntries<S> for EntryBlocks<'_, 
         if let Some(entry) = world.entry_of_leaf(units, leaf, self.filter) {
             self.enter(simd, entry, lanes & *active, t, active);
         }
+    }
+
+    #[inline(never)]
+    fn subtree(
+        &mut self,
+        simd: S,
+        tree: &TreeView<'_>,
+        start: ChildRef,
+        setups: &[RaySetup; LANES],
+        lanes: u16,
+        t: &mut [f32; LANES],
+        active: &mut u16,
+    ) {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                for lane in lanes_of(lanes) {
+                    let (ray, setup) = (self.rays.get(lane), &setups[lane]);
+                    if Q::ANY {
+                        let mut leaves = InstanceAny::<T>::new(self.world, &ray, self.filter);
+                        traverse_from(simd, tree, setup, t[lane], start, &mut leaves);
+                        if leaves.found {
+                            self.hits.prim[lane] = 0;
+                            *active &= !(1 << lane);
+                        }
+                    } else {
+                        let mut leaves = InstanceClosest::<T>::new(self.world, &ray, self.filter);
+                        leaves.best = self.hits.get(lane);
+                        traverse_from(simd, tree, setup, t[lane], start, &mut leaves);
+                        if let Some(best) = leaves.best {
+                            self.hits.set(lane, leaves.best);
+                            t[lane] = best.t;
+                        }
+                    }
+                }
+            },
+        );
     }
 }
 

@@ -290,16 +290,17 @@ pub(super) fn with_ordinary_length<'r>(ray: &'r Ray, room: &'r mut Ray) -> (&'r 
     (room, k)
 }
 
-struct InstanceClosest<'w, T: TriangleTest> {
+/// The closest hit of one ray among the entries that it meets.
+pub(super) struct InstanceClosest<'w, T: TriangleTest> {
     world: &'w World,
     ray: &'w Ray,
     filter: InstanceFilter<'w>,
-    best: Option<Hit>,
+    pub(super) best: Option<Hit>,
     test: PhantomData<T>,
 }
 
 impl<'w, T: TriangleTest> InstanceClosest<'w, T> {
-    fn new(world: &'w World, ray: &'w Ray, filter: InstanceFilter<'w>) -> Self {
+    pub(super) fn new(world: &'w World, ray: &'w Ray, filter: InstanceFilter<'w>) -> Self {
         InstanceClosest { world, ray, filter, best: None, test: PhantomData }
     }
 
@@ -334,16 +335,17 @@ impl<S: Simd, T: TriangleTest> LeafTest<S> for InstanceClosest<'_, T> {
     }
 }
 
-struct InstanceAny<'w, T: TriangleTest> {
+/// Whether an entry blocks one ray.
+pub(super) struct InstanceAny<'w, T: TriangleTest> {
     world: &'w World,
     ray: &'w Ray,
     filter: InstanceFilter<'w>,
-    found: bool,
+    pub(super) found: bool,
     test: PhantomData<T>,
 }
 
 impl<'w, T: TriangleTest> InstanceAny<'w, T> {
-    fn new(world: &'w World, ray: &'w Ray, filter: InstanceFilter<'w>) -> Self {
+    pub(super) fn new(world: &'w World, ray: &'w Ray, filter: InstanceFilter<'w>) -> Self {
         InstanceAny { world, ray, filter, found: false, test: PhantomData }
     }
 }
