@@ -132,8 +132,8 @@ pub struct MeasuredError {
     /// Root mean square of the same error.
     pub rms_rad: f64,
     /// Error of the deflection due to the field's finite lattice, estimated from the largest
-    /// difference between rays through the spline and rays through polynomials of fifth degree, both
-    /// of the same nodes. Infinite when the field has too few nodes for an estimate.
+    /// difference between rays through the spline and rays through polynomials of fifth degree,
+    /// both of the same nodes. Infinite when the field has too few nodes for an estimate.
     pub resolution_rad: f64,
     /// Number of rays compared.
     pub rays: usize,

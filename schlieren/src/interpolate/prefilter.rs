@@ -1,7 +1,7 @@
 //! Computes the coefficients of the cubic B-spline through given values at the nodes.
 //!
-//! The coefficients `c` satisfy `c[i-1] + 4 c[i] + c[i+1] = 6 v[i]` at every node. Two conditions at
-//! the ends are missing. The spline has no knot at the second and at the last but one node: its
+//! The coefficients `c` satisfy `c[i-1] + 4 c[i] + c[i+1] = 6 v[i]` at every node. Two conditions
+//! at the ends are missing. The spline has no knot at the second and at the last but one node: its
 //! third derivative is continuous there (de Boor, "A Practical Guide to Splines", chapter IV), so
 //! the spline keeps its order up to the faces of the field. (A natural spline, whose second
 //! derivative vanishes at the ends, is of second order there: 5.6 % wrong in a wall layer of three

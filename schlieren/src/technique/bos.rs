@@ -4,8 +4,9 @@
 //! Rays are traced from the camera through the flow to the background. The camera is far away, so
 //! they form a parallel beam. The background is at `Optics::focus_m` behind the flow as the camera
 //! sees it, and the camera is focused on it. A ray that leaves with the deflection ε at the depth z
-//! hits it displaced by `ξ + ε (focus - z)`. The dots of the image seem to move the other way, see
-//! [`Map::apparent_m`]. The paths must be traced against the light ([`ReversedPaths`]).
+//! hits it displaced by `ξ + ε (focus - z)`. The dots of the image seem to move the other way, as
+//! the map's apparent displacement says. The paths must be traced against the light
+//! ([`ReversedPaths`]).
 //!
 //! The pattern consists of random dots: one dot per cell of a square lattice, jittered by a hash of
 //! the cell. It is the same at any resolution.
@@ -13,8 +14,6 @@
 use super::Photon;
 use crate::optics::{Optics, PlaneVector};
 use crate::path::{Exit, LightPaths, PathQuantities, SkipReport, Start};
-#[cfg(doc)]
-use crate::render::Map;
 use crate::view::View;
 use rt_core::math::mix64;
 

@@ -90,9 +90,9 @@ const ENOUGH: usize = 60;
 /// Steps from cell to cell, at most: at a corner of a mesh.
 const MOST_STEPS: usize = 4;
 
-/// At a border, all neighbours lie on one side. A cubic polynomial then needs points at three steps.
-/// (Cells at four steps would determine one too, but badly: in stretched cells, averages of a
-/// quadratic field came back with errors of 2e-4.)
+/// At a border, all neighbours lie on one side. A cubic polynomial then needs points at three
+/// steps. (Cells at four steps would determine one too, but badly: in stretched cells, averages of
+/// a quadratic field came back with errors of 2e-4.)
 const STEPS_AT_BORDERS: usize = 3;
 
 /// Where the square of the neighbours' mean distance is more than this part of their mean square,

@@ -1,5 +1,5 @@
-//! Renders frames that need nothing but camera rays, or these and hard shadows ([`shadows`]): trace,
-//! look up, light. It keeps no wavefronts, ray states or points.
+//! Renders frames that need nothing but camera rays, or these and hard shadows ([`shadows`]):
+//! trace, look up, light. It keeps no wavefronts, ray states or points.
 //!
 //! The lights and lobes are those of the general loop, computed for sixteen pixels at a time. Half
 //! of the time besides tracing was waiting for vertices (measured on a million triangles, one after
