@@ -57,7 +57,12 @@ impl ColorBy {
                 }
             }
         }
-        let available = if names.is_empty() { "no arrays at all".into() } else { names.join(", ") };
+        let mut available =
+            if names.is_empty() { "no arrays at all".into() } else { names.join(", ") };
+        let arrays = attributes.iter().flat_map(|a| a.point.iter().chain(&a.cell));
+        if let Some(near) = most_like(name, arrays.map(|a| a.name.as_str())) {
+            available = format!("{available}; did you mean `{near}`?");
+        }
         Err(ModelError::NoArray { name: name.into(), kind: data.kind(), available })
     }
 
@@ -102,4 +107,32 @@ pub(crate) fn linear_from_srgb8(array: &DataArray, i: usize) -> [f32; 4] {
 /// The sRGB decoding curve for one channel in 0..=1.
 pub(crate) fn linear_from_srgb(v: f32) -> f32 {
     if v <= 0.040_45 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
+}
+
+/// The name that is most like a name that is not there, if one is: it has other capitals, or few
+/// letters differ.
+fn most_like<'a>(name: &str, names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+    let name = name.to_lowercase();
+    let likeness = |other: &str| strsim::jaro_winkler(&name, &other.to_lowercase());
+    names
+        .map(|other| (likeness(other), other))
+        .filter(|(likeness, _)| *likeness > 0.8)
+        // The first of equals, so that the order of arrays decides.
+        .reduce(|a, b| if b.0 > a.0 { b } else { a })
+        .map(|(_, other)| other)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn misspelt_names_find_the_one_that_was_meant() {
+        let names = ["Temperature", "rho", "velocity", "Density"];
+        let near = |name| most_like(name, names.into_iter());
+        assert_eq!(near("RHO"), Some("rho"));
+        assert_eq!(near("temprature"), Some("Temperature"));
+        assert_eq!(near("density"), Some("Density"));
+        assert_eq!(near("pressure"), None);
+    }
 }

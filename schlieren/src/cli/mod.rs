@@ -2,6 +2,7 @@
 
 mod flow_args;
 mod index;
+mod info;
 mod media_args;
 mod probe;
 mod render;
@@ -31,6 +32,8 @@ enum Command {
     Render(Box<render::RenderArgs>),
     /// Renders a time series, or one flow for several values of a key of its scene
     Sweep(Box<sweep::SweepArgs>),
+    /// Prints what a flow's file holds, and a command that renders it
+    Info(info::InfoArgs),
     /// Prints the path of one pixel's ray and its numbers
     Probe(Box<probe::ProbeArgs>),
     /// Opens an interactive page in the browser
@@ -55,6 +58,7 @@ fn execute(cli: Cli) -> anyhow::Result<()> {
     match cli.command {
         Command::Render(args) => render::render(common, &args),
         Command::Sweep(args) => sweep::sweep(common, &args),
+        Command::Info(args) => info::info(common, &args),
         Command::Probe(args) => probe::probe(common, &args),
         #[cfg(feature = "serve")]
         Command::Serve(args) => serve::serve(common, &args),

@@ -26,6 +26,10 @@ pub(super) struct RenderArgs {
     /// Deflection map as NumPy array (height, width, 2) in rad
     #[arg(long, value_name = "NPY")]
     npy: Option<PathBuf>,
+    /// With --technique bos: the background without the flow as PNG, for programs that correlate
+    /// the two images
+    #[arg(long, value_name = "PNG")]
+    reference: Option<PathBuf>,
     /// Print the effective scene as TOML; render only if an output is given
     #[arg(long)]
     print_scene: bool,
@@ -35,8 +39,11 @@ pub(super) struct RenderArgs {
 
 pub(super) fn render(common: CommonArgs, args: &RenderArgs) -> anyhow::Result<()> {
     let cancel = Cancel::on_ctrl_c()?;
-    let outputs = Outputs::new(args.out.as_deref(), args.exr.as_deref(), args.npy.as_deref())?;
+    let mut outputs = Outputs::new(args.out.as_deref(), args.exr.as_deref(), args.npy.as_deref())?;
     let scene = args.scene.scene(args.file.as_deref())?;
+    if let Some(path) = &args.reference {
+        outputs.reference = Some(reference_path(path, &scene)?);
+    }
     if args.print_scene {
         std::io::stdout().lock().write_all(scene.effective().to_toml()?.as_bytes())?;
     }
@@ -59,6 +66,22 @@ pub(super) struct Outputs<'a> {
     png: Option<&'a Path>,
     exr: Option<&'a Path>,
     npy: Option<&'a Path>,
+    /// The background without the flow.
+    reference: Option<&'a Path>,
+}
+
+/// Checks that the scene has a background, and the name of its file.
+fn reference_path<'p>(path: &'p Path, scene: &Scene) -> Result<&'p Path, UsageError> {
+    if !matches!(scene.technique, TechniqueSpec::Bos { .. }) {
+        return Err(UsageError(format!(
+            "--reference is the background of --technique bos; {} has none",
+            scene.technique.name()
+        )));
+    }
+    if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) {
+        return Err(UsageError(format!("--reference `{}` does not end in .png", path.display())));
+    }
+    Ok(path)
 }
 
 impl<'a> Outputs<'a> {
@@ -79,15 +102,15 @@ impl<'a> Outputs<'a> {
                 )));
             }
         }
-        Ok(Outputs { png, exr, npy })
+        Ok(Outputs { png, exr, npy, reference: None })
     }
 
     pub(super) fn is_empty(&self) -> bool {
-        self.png.is_none() && self.exr.is_none() && self.npy.is_none()
+        [self.png, self.exr, self.npy, self.reference].iter().all(Option::is_none)
     }
 
     fn names(&self) -> String {
-        let names: Vec<String> = [self.png, self.exr, self.npy]
+        let names: Vec<String> = [self.png, self.exr, self.npy, self.reference]
             .iter()
             .flatten()
             .map(|p| p.display().to_string())
@@ -110,7 +133,7 @@ pub(super) fn render_and_write(
     outputs: &Outputs<'_>,
 ) -> anyhow::Result<RenderSummary> {
     let start = Instant::now();
-    let section = TestSection::open(scene, |what| common.note(0, what))?;
+    let mut section = TestSection::open(scene, |what| common.note(0, what))?;
     let read_secs = start.elapsed().as_secs_f64();
     cancel.check()?;
 
@@ -131,6 +154,17 @@ pub(super) fn render_and_write(
     };
     drop(bar);
     let render_secs = start.elapsed().as_secs_f64() - read_secs;
+    if let Some(path) = outputs.reference {
+        let without = section.without_flow()?;
+        let still = std::mem::replace(&mut section.fields, without);
+        let control = Control { cancel: cancel.flag(), ..Control::default() };
+        let background = crate::render::render(scene, &section, Layers::NONE, &control);
+        section.fields = still;
+        match background {
+            Err(RenderError::Cancelled) => return Err(Interrupted.into()),
+            other => output::write_png(path, &other?)?,
+        };
+    }
     write(outputs, scene, &rendered, start.elapsed().as_secs_f64())?;
     for w in &rendered.report.warnings {
         common.warn(w);
@@ -162,6 +196,7 @@ pub(super) fn render_and_write(
         "output": outputs.png,
         "exr": outputs.exr,
         "npy": outputs.npy,
+        "reference": outputs.reference,
     });
     let deflection = r
         .largest_deflection_rad

@@ -9,6 +9,7 @@
 //! subtracted in f64 before values are rounded, so a plume with differences of 1e-9 in n keeps its
 //! digits.
 
+mod contents;
 mod evaluate;
 mod lattice;
 mod media;
@@ -16,6 +17,7 @@ mod medium;
 mod reference;
 mod series;
 
+pub use contents::{Array, Contents, Guess, Meaning, contents, of_dataset as contents_of_dataset};
 pub use media::{load_media, media_from_dataset};
 pub use medium::{Medium, Quantity, Source};
 pub use reference::Reference;

@@ -378,6 +378,8 @@ fn errors_name_the_array_the_file_and_the_cure() {
     let text =
         from_dataset(&data, &Options::new(Medium::density("density"))).unwrap_err().to_string();
     assert!(text.contains("no array `density`") && text.contains("`rho`"), "{text}");
+    let text = from_dataset(&data, &Options::new(Medium::density("Rho"))).unwrap_err().to_string();
+    assert!(text.contains("did you mean `rho`?"), "{text}");
     let constant = Medium::Density { density: Quantity::constant(1.2), species: vec![] };
     let text = from_dataset(&data, &Options::new(constant)).unwrap_err().to_string();
     assert!(text.contains("name the array"), "{text}");

@@ -90,6 +90,19 @@ impl TestSection {
         self
     }
 
+    /// The fields of the same gas at rest everywhere, with the same bodies and blank places.
+    ///
+    /// # Errors
+    /// If a field cannot be made, which the fields themselves rule out.
+    pub fn without_flow(&self) -> Result<Vec<Field>, RenderError> {
+        let still = |f: &Field| {
+            let eps = vec![0.0; f.eps().len()];
+            let nodes = f.nodes().map(<[_]>::to_vec);
+            Field::new(f.dims(), f.spacing_m(), f.origin_m(), eps, f.n0(), nodes)
+        };
+        self.fields.iter().map(|f| Ok(still(f).map_err(input::InputError::from)?)).collect()
+    }
+
     /// Extent of the field along the view's right and up, in metres.
     pub fn sides_m(&self) -> [f64; 2] {
         let size = self.fields[0].size_m();

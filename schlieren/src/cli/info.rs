@@ -1,0 +1,105 @@
+//! Implements `schlieren info`: what a flow's file holds, and a command that renders it.
+
+use crate::input::{Contents, contents};
+use clap::Args;
+use datasets::cli::CommonArgs;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// Options of `schlieren info`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  schlieren info flow.vtu
+  schlieren info --json flow.vtu | jq -r .command")]
+pub(super) struct InfoArgs {
+    /// The flow, of any format that `schlieren render` reads
+    file: PathBuf,
+}
+
+#[derive(Serialize)]
+struct Info<'a> {
+    file: &'a Path,
+    #[serde(flatten)]
+    contents: &'a Contents,
+    /// A command that renders the flow, quoted for a shell.
+    command: Option<String>,
+}
+
+pub(super) fn info(common: CommonArgs, args: &InfoArgs) -> anyhow::Result<()> {
+    let contents = contents(&args.file)?;
+    let command = command(&args.file, &contents);
+    let info = Info { file: &args.file, contents: &contents, command };
+    common.result(&info, || text(&info))
+}
+
+/// A command that renders the file.
+fn command(file: &Path, contents: &Contents) -> Option<String> {
+    let guess = contents.guess.as_ref()?;
+    let mut words = vec!["schlieren".into(), "render".into(), file.display().to_string()];
+    for (option, value) in &guess.options {
+        words.extend([(*option).to_owned(), value.clone()]);
+    }
+    words.extend(["-o".into(), "flow.png".into()]);
+    Some(words.iter().map(|w| quoted(w)).collect::<Vec<_>>().join(" "))
+}
+
+/// A word as a shell takes it.
+fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=:,+@%".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        return word.to_owned();
+    }
+    format!("'{}'", word.replace('\'', r"'\''"))
+}
+
+fn text(info: &Info<'_>) -> String {
+    let c = info.contents;
+    let mut lines = vec![format!(
+        "{}: {}, {} points, {} cells",
+        info.file.display(),
+        c.kind,
+        c.points,
+        c.cells
+    )];
+    if let Some([x, y, z]) = c.size {
+        let unit = c.guess.as_ref().map_or(1.0, |g| g.length_unit_m);
+        let unit = if unit == 1.0 { "m, if its unit is the metre" } else { "in its own unit" };
+        lines.push(match c.planar {
+            true => format!("  size {x:.4} x {y:.4}, two-dimensional, {unit}"),
+            false => format!("  size {x:.4} x {y:.4} x {z:.4} {unit}"),
+        });
+    }
+    for a in &c.arrays {
+        let of = if a.per_point { "points" } else { "cells" };
+        let values = match a.values {
+            Some([low, median, high]) => format!("{low:.6} to {high:.6}, median {median:.6}"),
+            None => "no finite value".into(),
+        };
+        let components = match a.components {
+            1 => String::new(),
+            n => format!(", {n} components, lengths"),
+        };
+        let meaning = match a.meaning.and_then(|m| serde_json::to_value(m).ok()) {
+            Some(m) => format!(": {}", m.as_str().unwrap_or_default().replace('-', " ")),
+            None => String::new(),
+        };
+        lines.push(format!("  array `{}` of {of}{components} {values}{meaning}", a.name));
+    }
+    lines.extend(c.notes.iter().map(|n| format!("  note: {n}")));
+    if let Some(command) = &info.command {
+        lines.extend(["To render it:".into(), format!("  {command}")]);
+    }
+    lines.join("\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_for_a_shell() {
+        assert_eq!(quoted("a/b-c.vtu"), "a/b-c.vtu");
+        assert_eq!(quoted("my flow's.vtu"), r"'my flow'\''s.vtu'");
+        assert_eq!(quoted(""), "''");
+    }
+}
