@@ -52,6 +52,15 @@ fn quoted(word: &str) -> String {
     format!("'{}'", word.replace('\'', r"'\''"))
 }
 
+/// A number with six significant digits.
+fn number(value: f64) -> String {
+    let rounded: f64 = format!("{value:.5e}").parse().unwrap_or(value);
+    match rounded.abs() {
+        0.0 | 1e-4..1e7 => rounded.to_string(),
+        _ => format!("{rounded:e}"),
+    }
+}
+
 fn text(info: &Info<'_>) -> String {
     let c = info.contents;
     let mut lines = vec![format!(
@@ -72,7 +81,9 @@ fn text(info: &Info<'_>) -> String {
     for a in &c.arrays {
         let of = if a.per_point { "points" } else { "cells" };
         let values = match a.values {
-            Some([low, median, high]) => format!("{low:.6} to {high:.6}, median {median:.6}"),
+            Some([low, median, high]) => {
+                format!("{} to {}, median {}", number(low), number(high), number(median))
+            }
             None => "no finite value".into(),
         };
         let components = match a.components {
@@ -95,6 +106,19 @@ fn text(info: &Info<'_>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn numbers_have_six_significant_digits() {
+        for (value, text) in [
+            (11_882.41, "11882.4"),
+            (0.0, "0"),
+            (-300.0, "-300"),
+            (2.5e-7, "2.5e-7"),
+            (1.234_567_8e20, "1.23457e20"),
+        ] {
+            assert_eq!(number(value), text);
+        }
+    }
 
     #[test]
     fn words_for_a_shell() {

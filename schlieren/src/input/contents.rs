@@ -77,14 +77,34 @@ pub struct Guess {
     pub length_unit_m: f64,
 }
 
-/// Names in lower case, and what arrays of these names are.
+/// [Plain](plain_name) names, and what arrays of these names are.
 const NAMES: &[(&[&str], Meaning)] = &[
-    (&["rho", "density", "dens", "rho_mean", "rhomean", "density_mean"], Meaning::Density),
-    (&["n-1", "n_minus_1", "nminus1", "refractivity"], Meaning::NMinus1),
-    (&["ne", "n_e", "electrons", "electron_density", "number_density_e"], Meaning::Electrons),
-    (&["t", "temp", "temperature", "tmean", "temperature_mean"], Meaning::Temperature),
-    (&["p", "pres", "press", "pressure", "ps", "pmean", "pressure_mean"], Meaning::Pressure),
+    (&["rho", "density", "dens"], Meaning::Density),
+    (&["n_1", "n_minus_1", "nminus1", "refractivity"], Meaning::NMinus1),
+    (&["ne", "n_e", "electrons", "electron_density"], Meaning::Electrons),
+    (&["t", "temp", "temperature"], Meaning::Temperature),
+    (&["p", "pres", "press", "pressure", "ps"], Meaning::Pressure),
 ];
+
+/// What solvers put before and after names: kinds of means, and units.
+const BEFORE: &[&str] = &["static_", "mean_", "avg_", "average_"];
+const AFTER: &[&str] =
+    &["_mean", "mean", "_avg", "_average", "_pa", "_k", "_kg_m3", "_kgm3", "_si"];
+
+/// A name in lower case, with underscores between its words, without units and kinds of means.
+fn plain_name(name: &str) -> String {
+    // Units in brackets, as Tecplot and Fluent write them.
+    let end = name.find(['[', '(']).filter(|at| *at > 0).unwrap_or(name.len());
+    let name = name[..end].trim().to_lowercase().replace(['-', ' '], "_");
+    let mut plain = name.as_str();
+    for before in BEFORE {
+        plain = plain.strip_prefix(before).unwrap_or(plain);
+    }
+    for after in AFTER {
+        plain = plain.strip_suffix(after).filter(|p| !p.is_empty()).unwrap_or(plain);
+    }
+    plain.to_owned()
+}
 
 /// Larger test sections are rather in millimetres, m.
 const LARGEST_SIDE_M: f64 = 20.0;
@@ -95,14 +115,41 @@ const AIR_KG_M3: f64 = 1.225;
 ///
 /// # Errors
 /// If it cannot be read.
+///
+/// # Example
+///
+/// ```no_run
+/// use schlieren::input::{Contents, Guess, contents};
+///
+/// let Contents { arrays, guess, .. } = contents("flow.vtu".as_ref())?;
+/// for array in &arrays {
+///     println!("{}: {:?}, {:?}", array.name, array.values, array.meaning);
+/// }
+/// if let Some(Guess { options, .. }) = guess {
+///     println!("schlieren render flow.vtu {options:?}");
+/// }
+/// # Ok::<(), schlieren::input::InputError>(())
+/// ```
 pub fn contents(path: &Path) -> Result<Contents, InputError> {
-    let (mut contents, warnings) = with_data(path, |data| Ok(of_dataset(data)))?;
+    let (mut contents, warnings) = with_data(path, |data| Ok(contents_of_dataset(data)))?;
     contents.notes.splice(0..0, warnings);
     Ok(contents)
 }
 
 /// Describes a data set.
-pub fn of_dataset(data: &Dataset) -> Contents {
+///
+/// # Example
+///
+/// ```
+/// use datasets::model::{DataArray, Dataset, ImageData, Values};
+/// use schlieren::input::{Array, Meaning, contents_of_dataset};
+///
+/// let mut gas = ImageData::new([2; 3], glam::DVec3::ZERO, glam::DVec3::splat(0.1));
+/// gas.attributes.point.push(DataArray::new("Density", 1, Values::F64(vec![1.1; 8])));
+/// let found: Array = contents_of_dataset(&Dataset::ImageData(gas)).arrays.remove(0);
+/// assert_eq!(found.meaning, Some(Meaning::Density));
+/// ```
+pub fn contents_of_dataset(data: &Dataset) -> Contents {
     let (points, cells) = data.counts();
     let mut c = Contents {
         kind: data.kind(),
@@ -185,7 +232,7 @@ fn values(array: &DataArray) -> Option<[f64; 3]> {
 
 fn meaning(array: &Array) -> Option<Meaning> {
     let [low, median, high] = array.values?;
-    let name = array.name.to_lowercase();
+    let name = plain_name(&array.name);
     // A vector is none of these.
     let by_name = (array.components == 1)
         .then(|| NAMES.iter().find(|(names, _)| names.contains(&name.as_str())))??
@@ -277,7 +324,7 @@ mod tests {
             (values[0], values[count - 1]) = (*low, *high);
             image.attributes.point.push(DataArray::new(*name, 1, Values::F64(values)));
         }
-        of_dataset(&Dataset::ImageData(image))
+        contents_of_dataset(&Dataset::ImageData(image))
     }
 
     fn options(c: &Contents) -> Vec<(&'static str, String)> {
@@ -292,6 +339,22 @@ mod tests {
         let state = [("T", [200.0, 300.0, 900.0]), ("p", [9e4, 1e5, 2e5])];
         let c = image([5; 3], 0.01, &state);
         assert_eq!(options(&c), [("--temperature", "T".into()), ("--pressure", "p".into())]);
+    }
+
+    #[test]
+    fn names_of_solvers_are_plain_without_units_and_means() {
+        for (name, plain) in [
+            ("T_K", "t"),
+            ("p_Pa", "p"),
+            ("rhoMean", "rho"),
+            ("Density [kg/m^3]", "density"),
+            ("static-pressure", "pressure"),
+            ("mean", "mean"),
+            ("n-1", "n_1"),
+            ("(a)", "(a)"),
+        ] {
+            assert_eq!(plain_name(name), plain, "{name}");
+        }
     }
 
     #[test]

@@ -17,7 +17,7 @@ mod medium;
 mod reference;
 mod series;
 
-pub use contents::{Array, Contents, Guess, Meaning, contents, of_dataset as contents_of_dataset};
+pub use contents::{Array, Contents, Guess, Meaning, contents, contents_of_dataset};
 pub use media::{load_media, media_from_dataset};
 pub use medium::{Medium, Quantity, Source};
 pub use reference::Reference;
