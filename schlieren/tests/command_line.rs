@@ -1,52 +1,12 @@
 //! Tests the program `schlieren` as users and their scripts run it.
 
+mod program;
+
 use datasets::image_io::{MetadataValue, read_exr, read_png};
-use datasets::model::{DataArray, Dataset, ImageData, Values};
-use datasets::write::{VtkOptions, write_vtk};
-use glam::DVec3;
+use program::{flow, flow_of, schlieren, text};
 use serde_json::Value;
 use std::path::Path;
-use std::process::{Command, Output};
-
-fn schlieren(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_schlieren")).args(args).output().expect("the program starts")
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
-}
-
-/// Writes a flow: air of 1.2 kg/m³ with a light blob right of and above the middle, in a box of 0.2
-/// x 0.1 x 0.1 m.
-fn flow(path: &Path) {
-    flow_of(path, [41, 21]);
-}
-
-/// [`flow`] with this number of nodes along x, and along y and z.
-fn flow_of(path: &Path, [nx, n]: [u32; 2]) {
-    let spacing_m = 0.1 / f64::from(n - 1);
-    let mut image =
-        ImageData::new([nx, n, n], DVec3::new(-0.1, -0.05, -0.05), DVec3::splat(spacing_m));
-    let at = |i: u32, n: u32| (f64::from(i) - 0.5 * f64::from(n - 1)) * spacing_m;
-    let blob = |i: u32| {
-        let (x, y, z) = (at(i % nx, nx), at(i / nx % n, n), at(i / nx / n, n));
-        1.2 - 0.3
-            * (-((x - 0.03).powi(2) + (y - 0.01).powi(2) + z * z) / (2.0 * 0.015f64.powi(2))).exp()
-    };
-    let values: Vec<f32> = (0..nx * n * n).map(|i| blob(i) as f32).collect();
-    let constant = |v: f32| Values::F32(vec![v; values.len()]);
-    let temperature = values.iter().map(|r| 1.2 / r * 293.15).collect();
-    image.attributes.point.push(DataArray::new("T", 1, Values::F32(temperature)));
-    image.attributes.point.push(DataArray::new("p", 1, constant(101_325.0)));
-    image.attributes.point.push(DataArray::new("Y", 1, constant(0.0)));
-    // Smoke of 6 per metre, with a NaN and an invalid negative value.
-    let mut soot = vec![6.0; values.len()];
-    (soot[0], soot[1]) = (f32::NAN, -1.0);
-    image.attributes.point.push(DataArray::new("soot", 1, Values::F32(soot)));
-    image.attributes.point.push(DataArray::new("rho", 1, Values::F32(values)));
-    write_vtk(path, &Dataset::ImageData(image), VtkOptions::default())
-        .expect("the flow is written");
-}
+use std::process::Command;
 
 /// Shape and values of a NumPy file.
 fn npy(path: &Path) -> (String, Vec<f32>) {
@@ -578,57 +538,4 @@ fn a_gpu_that_is_not_there() {
     assert_eq!(o.status.code(), Some(0), "{stderr}");
     assert!(stderr.contains("on the CPU"), "{stderr}");
     assert!(Path::new(&path("auto.png")).exists());
-}
-
-/// The words of a command that has no quotes.
-fn words(command: &str) -> Vec<&str> {
-    command.split(' ').skip(1).collect()
-}
-
-#[test]
-fn info_prints_a_command_that_renders_the_file() {
-    let folder = tempfile::tempdir().unwrap();
-    let solid = folder.path().join("flow.vti");
-    flow_of(&solid, [13, 9]);
-    let flat = folder.path().join("flat.vti");
-    // A plane of a test section in millimetres.
-    let mut image = ImageData::new([21, 11, 1], DVec3::ZERO, DVec3::splat(20.0));
-    let values = (0..231).map(|i| 1.2 + 0.01 * f32::from((i % 21) as u8)).collect();
-    image.attributes.point.push(DataArray::new("Density", 1, Values::F32(values)));
-    write_vtk(&flat, &Dataset::ImageData(image), VtkOptions::default()).unwrap();
-    for (file, option) in [(&solid, "--density rho"), (&flat, "--length-unit 0.001 --span 200")] {
-        let path = file.to_str().unwrap();
-        let said = schlieren(&["info", path]);
-        assert!(said.status.success(), "{}", text(&said.stderr));
-        let said = schlieren(&["--json", "info", path]);
-        let value: Value = serde_json::from_slice(&said.stdout).unwrap();
-        let command = value["command"].as_str().unwrap();
-        assert!(command.contains(option), "{command}");
-        let run = Command::new(env!("CARGO_BIN_EXE_schlieren"))
-            .args(words(command))
-            .current_dir(folder.path())
-            .output()
-            .unwrap();
-        assert!(run.status.success(), "{command}: {}", text(&run.stderr));
-        assert!(folder.path().join("flow.png").exists());
-        std::fs::remove_file(folder.path().join("flow.png")).unwrap();
-    }
-}
-
-#[test]
-fn the_background_without_the_flow_is_written_beside_the_picture() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("flow.vti");
-    flow_of(&file, [13, 9]);
-    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
-    let (flow, png, reference) = (path("flow.vti"), path("dots.png"), path("reference.png"));
-    let size = ["--size", "80x40", "--film-distance", "2m"];
-    let common = ["render", &flow, "--density", "rho", "-o", &png, "--reference", &reference];
-    let run = schlieren(&[&common[..], &["--technique", "bos"], &size].concat());
-    assert!(run.status.success(), "{}", text(&run.stderr));
-    let [moved, still] = [&png, &reference].map(|p| read_png(Path::new(p)).unwrap());
-    assert!(moved != still);
-    // Other techniques have no background.
-    let run = schlieren(&common);
-    assert_eq!(run.status.code(), Some(2), "{}", text(&run.stderr));
 }
