@@ -8,22 +8,22 @@ use glam::DVec3;
 use std::path::Path;
 use std::process::{Command, Output};
 
-pub fn schlieren(args: &[&str]) -> Output {
+pub(crate) fn schlieren(args: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_schlieren")).args(args).output().expect("the program starts")
 }
 
-pub fn text(bytes: &[u8]) -> String {
+pub(crate) fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
 
 /// Writes a flow: air of 1.2 kg/m³ with a light blob right of and above the middle, in a box of 0.2
 /// x 0.1 x 0.1 m.
-pub fn flow(path: &Path) {
+pub(crate) fn flow(path: &Path) {
     flow_of(path, [41, 21]);
 }
 
 /// [`flow`] with this number of nodes along x, and along y and z.
-pub fn flow_of(path: &Path, [nx, n]: [u32; 2]) {
+pub(crate) fn flow_of(path: &Path, [nx, n]: [u32; 2]) {
     let spacing_m = 0.1 / f64::from(n - 1);
     let mut image =
         ImageData::new([nx, n, n], DVec3::new(-0.1, -0.05, -0.05), DVec3::splat(spacing_m));
