@@ -165,6 +165,7 @@ impl Volume {
             occupied: Vec::new(),
             blocks: self.blocks,
             report,
+            level: self.level,
         };
         part.find_occupied();
         part

@@ -12,12 +12,15 @@
 
 mod adaptive;
 mod brick;
+mod cell_batch;
 mod layer;
+mod linear_segment;
 mod options;
 mod projection;
 mod ray_segments;
 mod reference;
 mod shading;
+mod shading_in_lanes;
 
 pub use brick::{Brick, PartialIntegral};
 pub use options::{
@@ -33,9 +36,13 @@ use crate::math::Aabb;
 use crate::ray::Ray;
 use crate::ray_cubic;
 use crate::shapes::outward_box;
+use crate::simd::{SimdLevel, UnavailableLevel};
 use crate::transfer_function::TransferFunction;
+use cell_batch::CellBatch;
+use fearless_simd::Level;
 use glam::{DVec3, UVec3};
 use layer::{Layer, MarchState};
+use linear_segment::RayInLanes;
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -135,6 +142,7 @@ pub struct Volume {
     occupied: Vec<bool>,
     blocks: UVec3,
     report: VolumeReport,
+    level: Level,
 }
 
 impl Volume {
@@ -179,6 +187,7 @@ impl Volume {
             occupied: Vec::new(),
             blocks,
             report,
+            level: Level::new(),
         };
         v.find_occupied();
         Ok(v)
@@ -188,6 +197,13 @@ impl Volume {
     pub fn set_transfer_function(&mut self, transfer: TransferFunction) {
         self.transfer = transfer;
         self.find_occupied();
+    }
+
+    /// The same volume, integrated with no more than the instruction set `level`; `None` for the
+    /// machine's best. Results have the same bits with all of them.
+    pub fn with_simd_level(mut self, level: Option<SimdLevel>) -> Result<Self, UnavailableLevel> {
+        self.level = SimdLevel::resolve(level)?;
+        Ok(self)
     }
 
     fn find_occupied(&mut self) {
@@ -291,22 +307,45 @@ impl Volume {
         if inside.1 <= inside.0 {
             return m;
         }
+        let ray = self.ray_in_lanes(&index_ray, per_t);
+        let mut batch = CellBatch::new();
         index_ray.walk([0; 3], cells, cells, i64::from(MACROCELL), t0, t1, |passed| {
             let block = UVec3::from_array(passed.cell.map(|c| c as u32 / MACROCELL));
-            self.march_block(&index_ray, per_t, inside.0, block, [passed.t0, passed.t1], &mut m);
+            let span = [passed.t0, passed.t1];
+            self.enter_block(&ray, inside.0, block, span, &mut batch, &mut m);
             !m.is_opaque()
         });
+        self.finish_batch(&ray, &mut batch, &mut m);
         m
+    }
+
+    /// A ray with what is the same all along it.
+    fn ray_in_lanes<'a>(&self, index_ray: &'a IndexRay, per_t: f64) -> RayInLanes<'a> {
+        RayInLanes { index_ray, per_t, lights: self.lights_on(index_ray) }
     }
 
     /// Continues from `ta` to `tb`, within one block. The ray enters the grid at `anchor`.
     fn march_block(
         &self,
-        ray: &IndexRay,
-        per_t: f64,
+        ray: &RayInLanes<'_>,
+        anchor: f64,
+        block: UVec3,
+        span: [f64; 2],
+        m: &mut MarchState,
+    ) {
+        let mut batch = CellBatch::new();
+        self.enter_block(ray, anchor, block, span, &mut batch, m);
+        self.finish_batch(ray, &mut batch, m);
+    }
+
+    /// [`Volume::march_block`], which may leave the last cells in `batch`.
+    fn enter_block(
+        &self,
+        ray: &RayInLanes<'_>,
         anchor: f64,
         block: UVec3,
         [ta, tb]: [f64; 2],
+        batch: &mut CellBatch,
         m: &mut MarchState,
     ) {
         if !(self.occupied[self.block_index(block)] && tb > ta) {
@@ -316,10 +355,26 @@ impl Volume {
         let size = i64::from(MACROCELL);
         let first = block.to_array().map(|b| i64::from(b) * size);
         let end = std::array::from_fn(|a| (first[a] + size).min(cells[a]));
-        ray.walk(first, end, cells, 1, ta, tb, |cell| {
-            self.march_cell(ray, per_t, anchor, cell, m);
-            !m.is_opaque()
-        });
+        if self.marches_in_lanes(m.quality) {
+            let pieces = self.transfer.pieces(m.allows_simplified());
+            ray.index_ray.walk(first, end, cells, 1, ta, tb, |cell| {
+                self.collect_cell(ray, pieces, cell, batch, m);
+                !m.is_opaque()
+            });
+        } else {
+            ray.index_ray.walk(first, end, cells, 1, ta, tb, |cell| {
+                self.march_cell(ray.index_ray, ray.per_t, anchor, cell, m);
+                !m.is_opaque()
+            });
+        }
+    }
+
+    /// Whether cells are integrated in closed form. Fixed steps and nearest values are not
+    /// integrated, and extinction that depends on the gradient is not linear in the scalar.
+    fn marches_in_lanes(&self, quality: VolumeQuality) -> bool {
+        matches!(quality, VolumeQuality::Tolerance { .. })
+            && !self.is_nearest()
+            && self.options.gradient_opacity.is_none()
     }
 
     #[inline]
@@ -361,7 +416,9 @@ impl Volume {
         }
         let light = self.light_along(ray, stored, [c.t0, c.t1], &p, &q);
         match m.quality {
-            VolumeQuality::Tolerance { .. } => self.march_adaptive(light.as_ref(), per_t, c, &b, m),
+            VolumeQuality::Tolerance { .. } => {
+                self.march_adaptive(light.as_ref(), per_t, [c.t0, c.t1], &b, m);
+            }
             VolumeQuality::Step { voxels } => {
                 // Samples lie at multiples of the step from where the ray enters the grid, clipped
                 // at cell faces.

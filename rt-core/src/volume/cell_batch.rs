@@ -1,0 +1,352 @@
+//! Cells along a ray, eight at a time.
+//!
+//! The scalar along the ray in a cell is a cubic. It is cut where it turns and where the transfer
+//! function bends, so within each piece extinction and colour are linear in the scalar, and the
+//! piece is integrated in closed form ([`super::linear_segment`]). Nothing has to be halved until
+//! halves agree.
+//!
+//! The lanes hold cells of one ray, not the same cell of several rays: no lane waits for rays that
+//! have diverged or ended, and a ray has the same bits alone, among others and in bricks.
+
+use super::layer::MarchState;
+use super::linear_segment::{LinearSegments, RayInLanes};
+use super::shading_in_lanes::LitCells;
+use super::{Volume, projection};
+use crate::grid_walk::Crossing;
+use crate::ray_cubic;
+use crate::transfer_function::Pieces;
+use fearless_simd::{Select, Simd, SimdBase, dispatch, f64x8};
+use glam::UVec3;
+
+/// Cells, or segments, that are computed together.
+pub(super) const LANES: usize = 8;
+/// One number for each lane.
+pub(super) type Row = [f64; LANES];
+
+/// Knots of the transfer function in one cell up to which the cell is cut at each of them. Beyond,
+/// knots are so dense that an interval with many of them is integrated as a whole
+/// ([`Volume::march_adaptive`]).
+const MAX_KNOTS: usize = 12;
+/// Cuts of a cell: its turns and knots, and its end. A cubic meets each knot up to three times.
+const MAX_CUTS: usize = 3 * MAX_KNOTS + 3;
+
+/// A last step of Newton's method, in units of the cell. The error after it is about its square.
+const NEWTON_STEP: f64 = 1e-6;
+const MAX_NEWTON_STEPS: u32 = 40;
+
+/// Up to eight cells that a ray crosses one after another, and segments of earlier ones.
+pub(super) struct CellBatch {
+    len: usize,
+    stored: [UVec3; LANES],
+    /// Values at the corners, x fastest.
+    corners: [Row; 8],
+    t0: Row,
+    t1: Row,
+    cell: [Row; 3],
+    /// Axis of the face through which the ray enters and leaves; -1 for none.
+    entry: Row,
+    exit: Row,
+    segments: LinearSegments,
+}
+
+impl CellBatch {
+    pub(super) fn new() -> Self {
+        CellBatch {
+            len: 0,
+            stored: [UVec3::ZERO; LANES],
+            corners: [[0.0; LANES]; 8],
+            t0: [0.0; LANES],
+            t1: [0.0; LANES],
+            cell: [[0.0; LANES]; 3],
+            entry: [-1.0; LANES],
+            exit: [-1.0; LANES],
+            segments: LinearSegments::new(),
+        }
+    }
+
+    #[inline]
+    fn push(&mut self, c: &Crossing, stored: UVec3, corners: &[f32; 8]) {
+        let lane = self.len & (LANES - 1);
+        self.stored[lane] = stored;
+        for (row, v) in self.corners.iter_mut().zip(corners) {
+            row[lane] = f64::from(*v);
+        }
+        (self.t0[lane], self.t1[lane]) = (c.t0, c.t1);
+        for a in 0..3 {
+            self.cell[a][lane] = c.cell[a] as f64;
+        }
+        let axis = |face: Option<usize>| face.map_or(-1.0, |a| a as f64);
+        (self.entry[lane], self.exit[lane]) = (axis(c.entry), axis(c.exit));
+        self.len += 1;
+    }
+}
+
+/// What the lanes compute from a batch.
+struct Cubics {
+    /// Bernstein coefficients of the scalar along each cell.
+    b: [Row; 4],
+    /// Smallest and largest coefficient.
+    lo: Row,
+    hi: Row,
+    /// Positions in the cell at which the ray enters and leaves.
+    p: [Row; 3],
+    q: [Row; 3],
+}
+
+impl Volume {
+    /// Adds the cell `c` to the batch, unless it is clear, and integrates the batch when it is
+    /// full.
+    #[inline]
+    pub(super) fn collect_cell(
+        &self,
+        ray: &RayInLanes<'_>,
+        pieces: &Pieces,
+        c: &Crossing,
+        batch: &mut CellBatch,
+        m: &mut MarchState,
+    ) {
+        if c.t1 <= c.t0 {
+            return;
+        }
+        let stored = UVec3::from_array(c.cell.map(|i| i as u32)) - self.first_point;
+        let dims = self.grid.dims;
+        let (row, slab) = (dims.x as usize, dims.x as usize * dims.y as usize);
+        let at = self.grid.index(stored.x, stored.y, stored.z);
+        let [v0, v1] = self.grid.pair(at);
+        let [v2, v3] = self.grid.pair(at + row);
+        let [v4, v5] = self.grid.pair(at + slab);
+        let [v6, v7] = self.grid.pair(at + slab + row);
+        let corners = [v0, v1, v2, v3, v4, v5, v6, v7];
+        // Infinity and NaN times zero are NaN.
+        if corners.iter().map(|v| v * 0.0).sum::<f32>() != 0.0 {
+            return;
+        }
+        let (mut lo, mut hi) = (v0, v0);
+        for v in corners {
+            lo = if v < lo { v } else { lo };
+            hi = if v > hi { v } else { hi };
+        }
+        if pieces.is_clear(lo.into(), hi.into()) {
+            return;
+        }
+        batch.push(c, stored, &corners);
+        if batch.len == LANES {
+            self.integrate_batch(ray, batch, m);
+        }
+    }
+
+    /// Integrates all that the batch holds.
+    pub(super) fn finish_batch(
+        &self,
+        ray: &RayInLanes<'_>,
+        batch: &mut CellBatch,
+        m: &mut MarchState,
+    ) {
+        self.integrate_batch(ray, batch, m);
+        dispatch!(self.level, simd => batch.segments.integrate(simd, ray, m));
+    }
+
+    /// Integrates the cells of the batch, and empties it; the last segments stay in it.
+    fn integrate_batch(&self, ray: &RayInLanes<'_>, batch: &mut CellBatch, m: &mut MarchState) {
+        if batch.len > 0 && !m.is_opaque() {
+            dispatch!(self.level, simd => self.integrate_batch_in(simd, ray, batch, m));
+        }
+        batch.len = 0;
+    }
+
+    #[inline(always)]
+    fn integrate_batch_in<S: Simd>(
+        &self,
+        simd: S,
+        ray: &RayInLanes<'_>,
+        batch: &mut CellBatch,
+        m: &mut MarchState,
+    ) {
+        let cubics = cubics(simd, ray, batch);
+        let pieces = self.transfer.pieces(m.allows_simplified());
+        let lit = ray.lights.as_ref().map(|lights| {
+            LitCells::new(simd, self, lights, &batch.stored[..batch.len], &cubics.p, &cubics.q)
+        });
+        // ---- Cut into segments along which the transfer function is linear.
+        let segments = &mut batch.segments;
+        for lane in 0..batch.len {
+            let (lo, hi) = (cubics.lo[lane], cubics.hi[lane]);
+            if pieces.is_clear(lo, hi) {
+                continue;
+            }
+            let b = cubics.b.map(|row| row[lane]);
+            let t = [batch.t0[lane], batch.t1[lane]];
+            let (first, last) = (pieces.number_at(lo), pieces.number_at(hi));
+            let lit = lit.as_ref().map(|l| l.cell(lane));
+            if first == last {
+                if segments.is_full() {
+                    segments.integrate(simd, ray, m);
+                }
+                segments.push(&b, t, [0.0, 1.0], &pieces.all()[first], lit.as_ref());
+            } else if last - first <= MAX_KNOTS {
+                for_each_linear(&b, pieces, [first, last], |b, u, piece| {
+                    if segments.is_full() {
+                        segments.integrate(simd, ray, m);
+                    }
+                    segments.push(b, t, u, &pieces.all()[piece], lit.as_ref());
+                });
+            } else {
+                segments.integrate(simd, ray, m);
+                let [p, q] = [&cubics.p, &cubics.q].map(|rows| rows.map(|row| row[lane]));
+                let light = self.light_along(ray.index_ray, batch.stored[lane], t, &p, &q);
+                self.march_adaptive(light.as_ref(), ray.per_t, t, &b, m);
+            }
+            if m.is_opaque() {
+                return;
+            }
+        }
+    }
+}
+
+/// [`IndexRay::fractions`](crate::grid_walk::IndexRay::fractions) and [`ray_cubic::along`] in
+/// lanes.
+#[inline(always)]
+fn cubics<S: Simd>(simd: S, ray: &RayInLanes<'_>, batch: &CellBatch) -> Cubics {
+    let s = |x: f64| f64x8::splat(simd, x);
+    let load = |row: &Row| f64x8::from_slice(simd, row);
+    let (zero, one) = (s(0.0), s(1.0));
+    // ---- Where the ray enters and leaves each cell.
+    let (mut p, mut q) = ([zero; 3], [zero; 3]);
+    let (t0, t1) = (load(&batch.t0), load(&batch.t1));
+    let (entry, exit) = (load(&batch.entry), load(&batch.exit));
+    for a in 0..3 {
+        let (o, d) = (s(ray.index_ray.o[a]), ray.index_ray.d[a]);
+        let (cell, axis) = (load(&batch.cell[a]), s(a as f64));
+        let (near, far) = if d > 0.0 { (zero, one) } else { (one, zero) };
+        let start = min(max((o + t0 * s(d)) - cell, zero), one);
+        let end = min(max((o + t1 * s(d)) - cell, zero), one);
+        p[a] = entry.simd_eq(axis).select(near, start);
+        q[a] = exit.simd_eq(axis).select(far, end);
+    }
+    // ---- The values there, and between.
+    let mut r = [zero; 8];
+    for (r, row) in r.iter_mut().zip(&batch.corners) {
+        *r = load(row);
+    }
+    for (axis, step) in [(0usize, 1usize), (1, 2), (2, 4)] {
+        for i in 0..8 {
+            if i & step == 0 {
+                let (a, b) = (r[i], r[i | step]);
+                r[i] = (one - p[axis]) * a + p[axis] * b;
+                r[i | step] = (one - q[axis]) * a + q[axis] * b;
+            }
+        }
+    }
+    let third = s(1.0 / 3.0);
+    let b = [r[0], (r[1] + r[2] + r[4]) * third, (r[3] + r[5] + r[6]) * third, r[7]];
+    let mut cubics = Cubics {
+        b: [[0.0; LANES]; 4],
+        lo: [0.0; LANES],
+        hi: [0.0; LANES],
+        p: [[0.0; LANES]; 3],
+        q: [[0.0; LANES]; 3],
+    };
+    for i in 0..4 {
+        b[i].store_slice(&mut cubics.b[i]);
+    }
+    min(min(b[0], b[1]), min(b[2], b[3])).store_slice(&mut cubics.lo);
+    max(max(b[0], b[1]), max(b[2], b[3])).store_slice(&mut cubics.hi);
+    for a in 0..3 {
+        p[a].store_slice(&mut cubics.p[a]);
+        q[a].store_slice(&mut cubics.q[a]);
+    }
+    cubics
+}
+
+/// The larger of two numbers, in each lane; the second if either is NaN.
+#[inline(always)]
+pub(super) fn max<S: Simd>(a: f64x8<S>, b: f64x8<S>) -> f64x8<S> {
+    a.simd_gt(b).select(a, b)
+}
+
+/// The smaller of two numbers, in each lane; the second if either is NaN.
+#[inline(always)]
+fn min<S: Simd>(a: f64x8<S>, b: f64x8<S>) -> f64x8<S> {
+    a.simd_lt(b).select(a, b)
+}
+
+/// Calls `visit` with each part of the cubic `b` that lies within one piece of the transfer
+/// function, its range of the parameter, and the number of the piece. `first` and `last` are those
+/// of the smallest and largest coefficient.
+#[inline(never)]
+fn for_each_linear(
+    b: &[f64; 4],
+    pieces: &Pieces,
+    [first, last]: [usize; 2],
+    mut visit: impl FnMut(&[f64; 4], [f64; 2], usize),
+) {
+    let mut cuts = [1.0; MAX_CUTS];
+    let mut count = 0;
+    let (turns, turns_count) = projection::turns(b);
+    let (mut from, mut value) = (0.0, b[0]);
+    for end in turns[..turns_count].iter().copied().chain([1.0]) {
+        let at_end = if end == 1.0 { b[3] } else { ray_cubic::evaluate(b, end) };
+        let knot = |k: usize| pieces.all()[k].s;
+        let mut cut = |k: usize| {
+            let s = knot(k);
+            if (value < s) != (at_end < s) {
+                cuts[count] = crossing(&b.map(|x| x - s), [from, end], [value - s, at_end - s]);
+                count += 1;
+            }
+        };
+        // In the order in which they are met.
+        if value < at_end {
+            (first + 1..=last).for_each(&mut cut);
+        } else {
+            (first + 1..=last).rev().for_each(&mut cut);
+        }
+        if end < 1.0 {
+            cuts[count] = end;
+            count += 1;
+        }
+        (from, value) = (end, at_end);
+    }
+    // The last entry is 1.
+    let (mut rest, mut from) = (*b, 0.0);
+    for &end in &cuts[..=count] {
+        if end <= from {
+            continue;
+        }
+        let (part, behind) = if end < 1.0 {
+            ray_cubic::split(&rest, (end - from) / (1.0 - from))
+        } else {
+            (rest, rest)
+        };
+        let piece = pieces.number_at(ray_cubic::evaluate(&part, 0.5));
+        let interval = &pieces.all()[piece];
+        if interval.sigma != [0.0; 2] {
+            visit(&part, [from, end], piece);
+        }
+        (rest, from) = (behind, end);
+    }
+}
+
+/// Where the cubic `b`, which is monotone over `range` and has the values `f` at its ends, is zero:
+/// Newton's method in a shrinking bracket, from the secant on.
+#[inline]
+fn crossing(b: &[f64; 4], range: [f64; 2], f: [f64; 2]) -> f64 {
+    let [mut lo, mut hi] = range;
+    let mut u = lo + (hi - lo) * (f[0] / (f[0] - f[1]));
+    for _ in 0..MAX_NEWTON_STEPS {
+        if !(u >= lo && u <= hi) {
+            u = 0.5 * (lo + hi);
+        }
+        let (value, slope) = ray_cubic::evaluate_with_slope(b, u);
+        if (value < 0.0) == (f[0] < 0.0) {
+            lo = u;
+        } else {
+            hi = u;
+        }
+        let step = value / slope;
+        if step.abs() < NEWTON_STEP {
+            return (u - step).clamp(range[0], range[1]);
+        }
+        u -= step;
+    }
+    0.5 * (lo + hi)
+}
