@@ -557,6 +557,39 @@ mod tests {
     }
 
     #[test]
+    fn simplified_pieces_are_few_and_within_their_tolerance() {
+        // As VTK's tables: 1,024 entries of a curved opacity and of curved colours.
+        let table = |f: f64| {
+            let s = f as f32;
+            [s, 0.5 + 0.5 * (3.0 * s).sin(), (1.0 - s).powi(2), 1.0]
+        };
+        let colors = (0..1024).map(|i| table(f64::from(i) / 1023.0)).collect();
+        let sigma = |f: f64| if f < 0.3 { 0.0 } else { -(1.0 - 0.8 * (f - 0.3)).ln() };
+        let mut points: Vec<[f32; 2]> =
+            (0..1024).map(|i| f64::from(i) / 1023.0).map(|f| [f as f32, sigma(f) as f32]).collect();
+        // A step, which must stay one.
+        points.insert(800, [points[800][0], 0.1]);
+        let tf = TransferFunction::new(ColorMap::new(colors, [0.0, 1.0]), points).unwrap();
+        let (exact, simplified) = (tf.pieces(false), tf.pieces(true));
+        let (all, few) = (exact.all().len(), simplified.all().len());
+        assert!(all > 1000 && few < 80, "{all} {few}");
+        for k in 0..30_000 {
+            let s = f64::from(k) / 29_000.0 - 0.01;
+            let at = |p: &Pieces| {
+                let p = *p.interval(s);
+                let x = s - p.s;
+                (p.sigma[0] + p.sigma[1] * x, p.color.map(|c| c[0] + c[1] * x))
+            };
+            let ((sigma, color), (sigma2, color2)) = (at(exact), at(simplified));
+            assert!((sigma - sigma2).abs() <= 1.001 * SIMPLIFIED_EXTINCTION * sigma + 1e-9, "{s}");
+            for c in 0..3 {
+                assert!((color[c] - color2[c]).abs() <= 1.001 * SIMPLIFIED_COLOR, "{s}");
+            }
+            assert_eq!(sigma == 0.0, sigma2 == 0.0, "{s}: what is clear stays clear");
+        }
+    }
+
+    #[test]
     fn clear_ranges_are_seen_and_narrow_peaks_are_not_clear() {
         let points = vec![[0.0, 0.0], [1.999, 0.0], [2.0, 100.0], [2.001, 0.0], [5.0, 0.0]];
         let tf = TransferFunction::new(map(), points).unwrap();

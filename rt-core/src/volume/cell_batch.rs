@@ -8,12 +8,12 @@
 //! The lanes hold cells of one ray, not the same cell of several rays: no lane waits for rays that
 //! have diverged or ended, and a ray has the same bits alone, among others and in bricks.
 
+use super::Volume;
 use super::layer::MarchState;
+use super::linear_parts::for_each_linear;
 use super::linear_segment::{LinearSegments, RayInLanes};
 use super::shading_in_lanes::LitCells;
-use super::{Volume, projection};
 use crate::grid_walk::Crossing;
-use crate::ray_cubic;
 use crate::transfer_function::Pieces;
 use fearless_simd::{Select, Simd, SimdBase, dispatch, f64x8};
 use glam::UVec3;
@@ -26,14 +26,7 @@ pub(super) type Row = [f64; LANES];
 /// Knots of the transfer function in one cell up to which the cell is cut at each of them. Beyond,
 /// knots are so dense that an interval with many of them is integrated as a whole
 /// ([`Volume::march_adaptive`]).
-const MAX_KNOTS: usize = 12;
-/// Cuts of a cell: its turns and knots, and its end. A cubic meets each knot up to three times.
-const MAX_CUTS: usize = 3 * MAX_KNOTS + 3;
-
-/// A last step of Newton's method, in units of the cell. The error after it is about its square.
-const NEWTON_STEP: f64 = 1e-6;
-const MAX_NEWTON_STEPS: u32 = 40;
-
+pub(super) const MAX_KNOTS: usize = 12;
 /// Up to eight cells that a ray crosses one after another, and segments of earlier ones.
 pub(super) struct CellBatch {
     len: usize,
@@ -270,83 +263,103 @@ fn min<S: Simd>(a: f64x8<S>, b: f64x8<S>) -> f64x8<S> {
     a.simd_lt(b).select(a, b)
 }
 
-/// Calls `visit` with each part of the cubic `b` that lies within one piece of the transfer
-/// function, its range of the parameter, and the number of the piece. `first` and `last` are those
-/// of the smallest and largest coefficient.
-#[inline(never)]
-fn for_each_linear(
-    b: &[f64; 4],
-    pieces: &Pieces,
-    [first, last]: [usize; 2],
-    mut visit: impl FnMut(&[f64; 4], [f64; 2], usize),
-) {
-    let mut cuts = [1.0; MAX_CUTS];
-    let mut count = 0;
-    let (turns, turns_count) = projection::turns(b);
-    let (mut from, mut value) = (0.0, b[0]);
-    for end in turns[..turns_count].iter().copied().chain([1.0]) {
-        let at_end = if end == 1.0 { b[3] } else { ray_cubic::evaluate(b, end) };
-        let knot = |k: usize| pieces.all()[k].s;
-        let mut cut = |k: usize| {
-            let s = knot(k);
-            if (value < s) != (at_end < s) {
-                cuts[count] = crossing(&b.map(|x| x - s), [from, end], [value - s, at_end - s]);
-                count += 1;
-            }
-        };
-        // In the order in which they are met.
-        if value < at_end {
-            (first + 1..=last).for_each(&mut cut);
-        } else {
-            (first + 1..=last).rev().for_each(&mut cut);
-        }
-        if end < 1.0 {
-            cuts[count] = end;
-            count += 1;
-        }
-        (from, value) = (end, at_end);
-    }
-    // The last entry is 1.
-    let (mut rest, mut from) = (*b, 0.0);
-    for &end in &cuts[..=count] {
-        if end <= from {
-            continue;
-        }
-        let (part, behind) = if end < 1.0 {
-            ray_cubic::split(&rest, (end - from) / (1.0 - from))
-        } else {
-            (rest, rest)
-        };
-        let piece = pieces.number_at(ray_cubic::evaluate(&part, 0.5));
-        let interval = &pieces.all()[piece];
-        if interval.sigma != [0.0; 2] {
-            visit(&part, [from, end], piece);
-        }
-        (rest, from) = (behind, end);
-    }
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::colormap::ColorMap;
+    use crate::grid::Grid;
+    use crate::ray::Ray;
+    use crate::test_shapes::Random;
+    use crate::transfer_function::TransferFunction;
+    use crate::volume::{
+        PartialIntegral, VolumeLight, VolumeOptions, VolumeQuality, VolumeSample, VolumeShading,
+    };
+    use glam::{DVec3, Vec3};
 
-/// Where the cubic `b`, which is monotone over `range` and has the values `f` at its ends, is zero:
-/// Newton's method in a shrinking bracket, from the secant on.
-#[inline]
-fn crossing(b: &[f64; 4], range: [f64; 2], f: [f64; 2]) -> f64 {
-    let [mut lo, mut hi] = range;
-    let mut u = lo + (hi - lo) * (f[0] / (f[0] - f[1]));
-    for _ in 0..MAX_NEWTON_STEPS {
-        if !(u >= lo && u <= hi) {
-            u = 0.5 * (lo + hi);
-        }
-        let (value, slope) = ray_cubic::evaluate_with_slope(b, u);
-        if (value < 0.0) == (f[0] < 0.0) {
-            lo = u;
-        } else {
-            hi = u;
-        }
-        let step = value / slope;
-        if step.abs() < NEWTON_STEP {
-            return (u - step).clamp(range[0], range[1]);
-        }
-        u -= step;
+    /// The same march, cell by cell, by halving until halves agree.
+    fn by_halving(v: &Volume, ray: &Ray, quality: VolumeQuality) -> VolumeSample {
+        let (index_ray, cells, t0, t1) = v.index_ray(ray, 0.0, f64::INFINITY);
+        let cells = cells.to_array().map(i64::from);
+        let per_t = ray.dir.as_dvec3().length();
+        let mut ends = (f64::INFINITY, f64::NEG_INFINITY);
+        index_ray.walk([0; 3], cells, cells, 1, t0, t1, |c| {
+            ends = (ends.0.min(c.t0), c.t1);
+            true
+        });
+        let path = (ends.1 - ends.0) * per_t;
+        let mut m = PartialIntegral::default().march(quality, path);
+        index_ray.walk([0; 3], cells, cells, 1, t0, t1, |c| {
+            v.march_cell(&index_ray, per_t, ends.0, c, &mut m);
+            true
+        });
+        PartialIntegral::from(m).sample()
     }
-    0.5 * (lo + hi)
+
+    fn shadings() -> Vec<VolumeOptions> {
+        let lit = VolumeShading { ambient: 0.2, diffuse: 0.7, ..VolumeShading::default() };
+        let glossy = VolumeShading { specular: 0.5, shininess: 12.0, ..lit };
+        let fixed = VolumeShading {
+            light: Some(Vec3::new(1.0, 2.0, -0.5)),
+            shininess: 7.5,
+            half_gradient: 0.3,
+            highlight: super::super::VolumeHighlight::Mirrored,
+            ..glossy
+        };
+        let light = |d: Vec3, color| VolumeLight { direction: Some(d), color };
+        let lights = vec![light(Vec3::X, [0.9, 0.1, 0.2]), light(Vec3::Z, [0.1, 0.4, 0.9])];
+        let of = |shading| VolumeOptions { shading, ..VolumeOptions::default() };
+        vec![
+            of(None),
+            of(Some(lit)),
+            of(Some(glossy)),
+            VolumeOptions { clamped_gradients: true, ..of(Some(fixed)) },
+            VolumeOptions { lights, ..of(Some(lit)) },
+        ]
+    }
+
+    #[test]
+    fn cells_in_lanes_agree_with_halving_for_all_kinds_of_light() {
+        let n = 14;
+        let mut rng = Random::new(3);
+        let mut values: Vec<f32> = (0..n * n * n)
+            .map(|i| {
+                let p = Vec3::new((i % n) as f32, (i / n % n) as f32, (i / n / n) as f32);
+                (0.6 * p.x).sin() * (0.5 * p.y).cos() + 0.3 * (0.8 * p.z).sin()
+            })
+            .collect();
+        values[5 * n * n + 7 * n + 4] = f32::NAN;
+        let grid = Grid::new(UVec3::splat(n as u32), DVec3::ZERO, DVec3::ONE, values).unwrap();
+        let colors = ColorMap::new(
+            vec![[0.1, 0.2, 1.0, 1.0], [0.9, 1.0, 0.1, 1.0], [1.0, 0.1, 0.1, 1.0]],
+            [-1.3, 1.3],
+        );
+        for extinction in [
+            vec![[-1.3, 0.0], [1.3, 0.6]],
+            vec![[-0.2, 0.0], [0.2, 4.0], [0.3, 0.1]],
+            vec![[0.1, 0.0], [0.1, 1.5], [0.6, 1.5], [0.6, 0.2]],
+        ] {
+            let transfer = TransferFunction::new(colors.clone(), extinction).unwrap();
+            for options in shadings() {
+                let v =
+                    Volume::new(grid.clone().into(), transfer.clone(), options.clone()).unwrap();
+                for _ in 0..60 {
+                    let target = Vec3::splat(6.5) + 6.0 * rng.direction() * rng.unit();
+                    let from = target + 30.0 * rng.direction();
+                    let ray = Ray::new(from, target - from);
+                    for levels in [0.5, 0.02] {
+                        let quality = VolumeQuality::Tolerance { levels };
+                        let got = v.integrate(&ray, 0.0, f32::INFINITY, &quality);
+                        let halved = by_halving(&v, &ray, quality);
+                        for c in 0..4 {
+                            // Each is within `levels` of the truth.
+                            let off = 255.0 * (got.rgba[c] - halved.rgba[c]).abs();
+                            assert!(off <= 2.0 * levels, "{off} of {levels}, {options:?}");
+                        }
+                        let apart = (got.depth - halved.depth).abs();
+                        assert!(!(apart * ray.dir.length() > 0.2), "{got:?} {halved:?}");
+                    }
+                }
+            }
+        }
+    }
 }

@@ -1,11 +1,11 @@
 //! Direct volume rendering: emission and absorption along a ray through a uniform grid (Max 1995,
 //! "Optical Models for Direct Volume Rendering", eq. 7), front to back.
 //!
-//! Along a ray the trilinear interpolant of a cell is a cubic. It is split until each interval is
-//! nearly straight, and over such intervals the transfer function is integrated exactly
-//! ([`TransferFunction`]), so thin shells are not skipped. An interval is nearly straight when it
-//! and its two parts differ by less than its share of the tolerance; steps of the transfer function
-//! are taken into account where they are.
+//! Along a ray the trilinear interpolant of a cell is a cubic. It is cut where it meets the knots of
+//! the transfer function, and each part is integrated in closed form, eight at a time
+//! (`cell_batch`, `linear_segment`), so thin shells are not skipped. Where knots are too dense for
+//! that, and where extinction depends on the gradient, an interval is split until it and its two
+//! parts differ by less than its share of the tolerance (`adaptive`).
 //!
 //! Empty space is skipped by blocks of cells ([`MACROCELL`]) whose range of values has no
 //! extinction, then by cells.
@@ -14,6 +14,7 @@ mod adaptive;
 mod brick;
 mod cell_batch;
 mod layer;
+mod linear_parts;
 mod linear_segment;
 mod options;
 mod projection;
