@@ -182,6 +182,13 @@ impl TransferFunction {
         self.exact.is_clear(lo, hi)
     }
 
+    /// Whether there is extinction at all scalars in `lo..=hi`, as far as the buckets tell.
+    pub(crate) fn is_nowhere_clear(&self, lo: f64, hi: f64) -> bool {
+        let b = &self.exact.buckets;
+        let (a, z) = (b.index(lo), b.index(hi));
+        lo <= hi && (b.occupied_before[z + 1] - b.occupied_before[a]) as usize == z + 1 - a
+    }
+
     /// ∫σ, ∫σr, ∫σg, ∫σb over the scalars up to `s`, from some fixed scalar on.
     #[inline]
     pub(crate) fn integral(&self, s: f64) -> [f64; 4] {

@@ -163,6 +163,7 @@ impl Volume {
             first_point: low,
             ranges,
             occupied: Vec::new(),
+            filled: Vec::new(),
             blocks: self.blocks,
             report,
             level: self.level,

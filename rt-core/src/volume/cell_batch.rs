@@ -88,12 +88,12 @@ struct Cubics {
 
 impl Volume {
     /// Adds the cell `c` to the batch, unless it is clear, and integrates the batch when it is
-    /// full.
+    /// full. `pieces` are those of the transfer function, or `None` where no cell is clear.
     #[inline]
     pub(super) fn collect_cell(
         &self,
         ray: &RayInLanes<'_>,
-        pieces: &Pieces,
+        pieces: Option<&Pieces>,
         c: &Crossing,
         batch: &mut CellBatch,
         m: &mut MarchState,
@@ -114,13 +114,15 @@ impl Volume {
         if corners.iter().map(|v| v * 0.0).sum::<f32>() != 0.0 {
             return;
         }
-        let (mut lo, mut hi) = (v0, v0);
-        for v in corners {
-            lo = if v < lo { v } else { lo };
-            hi = if v > hi { v } else { hi };
-        }
-        if pieces.is_clear(lo.into(), hi.into()) {
-            return;
+        if let Some(pieces) = pieces {
+            let (mut lo, mut hi) = (v0, v0);
+            for v in corners {
+                lo = if v < lo { v } else { lo };
+                hi = if v > hi { v } else { hi };
+            }
+            if pieces.is_clear(lo.into(), hi.into()) {
+                return;
+            }
         }
         batch.push(c, stored, &corners);
         if batch.len == LANES {
@@ -164,14 +166,14 @@ impl Volume {
         let segments = &mut batch.segments;
         for lane in 0..batch.len {
             let (lo, hi) = (cubics.lo[lane], cubics.hi[lane]);
-            if pieces.is_clear(lo, hi) {
-                continue;
-            }
             let b = cubics.b.map(|row| row[lane]);
             let t = [batch.t0[lane], batch.t1[lane]];
             let (first, last) = (pieces.number_at(lo), pieces.number_at(hi));
             let lit = lit.as_ref().map(|l| l.cell(lane));
             if first == last {
+                if pieces.all()[first].sigma == [0.0; 2] {
+                    continue;
+                }
                 if segments.is_full() {
                     segments.integrate(simd, ray, m);
                 }

@@ -141,6 +141,9 @@ pub struct Volume {
     ranges: Vec<[f32; 2]>,
     /// Whether a block has any extinction.
     occupied: Vec<bool>,
+    /// Whether a block has extinction at all scalars of its range, so that none of its cells is
+    /// clear.
+    filled: Vec<bool>,
     blocks: UVec3,
     report: VolumeReport,
     level: Level,
@@ -186,6 +189,7 @@ impl Volume {
             first_point: UVec3::ZERO,
             ranges,
             occupied: Vec::new(),
+            filled: Vec::new(),
             blocks,
             report,
             level: Level::new(),
@@ -210,6 +214,8 @@ impl Volume {
     fn find_occupied(&mut self) {
         let clear = |r: &[f32; 2]| r[0] > r[1] || self.transfer.is_clear(r[0].into(), r[1].into());
         self.occupied = self.ranges.iter().map(|r| !clear(r)).collect();
+        let filled = |r: &[f32; 2]| self.transfer.is_nowhere_clear(r[0].into(), r[1].into());
+        self.filled = self.ranges.iter().map(filled).collect();
         self.report.macrocells_clear = self.occupied.iter().filter(|o| !**o).count() as u64;
     }
 
@@ -349,7 +355,8 @@ impl Volume {
         batch: &mut CellBatch,
         m: &mut MarchState,
     ) {
-        if !(self.occupied[self.block_index(block)] && tb > ta) {
+        let index = self.block_index(block);
+        if !(self.occupied[index] && tb > ta) {
             return;
         }
         let cells = self.cells().to_array().map(i64::from);
@@ -358,6 +365,7 @@ impl Volume {
         let end = std::array::from_fn(|a| (first[a] + size).min(cells[a]));
         if self.marches_in_lanes(m.quality) {
             let pieces = self.transfer.pieces(m.allows_simplified());
+            let pieces = (!self.filled[index]).then_some(pieces);
             ray.index_ray.walk(first, end, cells, 1, ta, tb, |cell| {
                 self.collect_cell(ray, pieces, cell, batch, m);
                 !m.is_opaque()
