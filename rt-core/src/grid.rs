@@ -172,6 +172,7 @@ impl Grid {
     }
 
     /// Two neighbours along x, the first with this index in [`Grid::values`]; zeros past the end.
+    #[cfg(feature = "render")]
     #[inline]
     pub(crate) fn pair(&self, index: usize) -> [f32; 2] {
         match self.values.get(index..).and_then(|v| v.first_chunk()) {

@@ -18,7 +18,7 @@ pub(crate) fn attenuation<S: Simd>(simd: S, tau: f64x8<S>) -> f64x8<S> {
         sum = sum * x + s(term);
     }
     for _ in 0..8 {
-        sum = sum * sum;
+        sum *= sum;
     }
     sum
 }

@@ -357,8 +357,9 @@ mod tests {
                             let off = 255.0 * (got.rgba[c] - halved.rgba[c]).abs();
                             assert!(off <= 2.0 * levels, "{off} of {levels}, {options:?}");
                         }
-                        let apart = (got.depth - halved.depth).abs();
-                        assert!(!(apart * ray.dir.length() > 0.2), "{got:?} {halved:?}");
+                        let apart = (got.depth - halved.depth).abs() * ray.dir.length();
+                        // Both are infinite where half of the light passes.
+                        assert!(apart.is_nan() || apart <= 0.2, "{got:?} {halved:?}");
                     }
                 }
             }

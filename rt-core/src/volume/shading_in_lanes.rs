@@ -332,9 +332,9 @@ fn powers<S: Simd>(simd: S, base: f64x8<S>, exponent: f32) -> f64x8<S> {
         let mut product = f64x8::splat(simd, 1.0);
         while left > 0 {
             if left & 1 == 1 {
-                product = product * square;
+                product *= square;
             }
-            square = square * square;
+            square *= square;
             left >>= 1;
         }
         return product;
