@@ -274,8 +274,8 @@ impl Pieces {
 impl Buckets {
     #[inline]
     fn index(&self, s: f64) -> usize {
-        // Bucket 0 and the last one represent everything outside; NaN is in the first. Between these
-        // limits the conversion to i32 is one instruction, to usize it is not.
+        // Bucket 0 and the last one represent everything outside; NaN is in the first. Between
+        // these limits the conversion to i32 is one instruction, to usize it is not.
         let place = (s - self.lo) * self.per_scalar;
         let place = if place > 0.0 { place } else { 0.0 };
         let place = if place < LAST_BUCKET { place } else { LAST_BUCKET };

@@ -9,8 +9,9 @@
 //! have diverged or ended, and a ray has the same bits alone, among others and in bricks.
 
 use super::Volume;
+use super::lanes::{LANES, Row, max, min};
 use super::layer::MarchState;
-use super::linear_parts::for_each_linear;
+use super::linear_parts::{MAX_KNOTS, for_each_linear};
 use super::linear_segment::{LinearSegments, RayInLanes};
 use super::shading_in_lanes::LitCells;
 use crate::grid_walk::Crossing;
@@ -18,15 +19,6 @@ use crate::transfer_function::Pieces;
 use fearless_simd::{Select, Simd, SimdBase, dispatch, f64x8};
 use glam::UVec3;
 
-/// Cells, or segments, that are computed together.
-pub(super) const LANES: usize = 8;
-/// One number for each lane.
-pub(super) type Row = [f64; LANES];
-
-/// Knots of the transfer function in one cell up to which the cell is cut at each of them. Beyond,
-/// knots are so dense that an interval with many of them is integrated as a whole
-/// ([`Volume::march_adaptive`]).
-pub(super) const MAX_KNOTS: usize = 12;
 /// Up to eight cells that a ray crosses one after another, and segments of earlier ones.
 pub(super) struct CellBatch {
     len: usize,
@@ -251,18 +243,6 @@ fn cubics<S: Simd>(simd: S, ray: &RayInLanes<'_>, batch: &CellBatch) -> Cubics {
         q[a].store_slice(&mut cubics.q[a]);
     }
     cubics
-}
-
-/// The larger of two numbers, in each lane; the second if either is NaN.
-#[inline(always)]
-pub(super) fn max<S: Simd>(a: f64x8<S>, b: f64x8<S>) -> f64x8<S> {
-    a.simd_gt(b).select(a, b)
-}
-
-/// The smaller of two numbers, in each lane; the second if either is NaN.
-#[inline(always)]
-fn min<S: Simd>(a: f64x8<S>, b: f64x8<S>) -> f64x8<S> {
-    a.simd_lt(b).select(a, b)
 }
 
 #[cfg(test)]

@@ -1,10 +1,13 @@
 //! Where a cubic turns, and where it meets the knots of the transfer function.
 
-use super::cell_batch::MAX_KNOTS;
 use super::projection::turns;
 use crate::ray_cubic;
 use crate::transfer_function::Pieces;
 
+/// Knots of the transfer function in one cell up to which the cell is cut at each of them. Beyond,
+/// knots are so dense that an interval with many of them is integrated as a whole
+/// ([`super::Volume::march_adaptive`]).
+pub(super) const MAX_KNOTS: usize = 12;
 /// Cuts of a cell: its turns and knots, and its end. A cubic meets each knot up to three times.
 const MAX_CUTS: usize = 3 * MAX_KNOTS + 3;
 

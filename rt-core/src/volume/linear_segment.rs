@@ -10,7 +10,7 @@
 //!
 //! Only the bend of c(F) is left out. A bound on it decides whether the segment is divided.
 
-use super::cell_batch::{LANES, Row, max};
+use super::lanes::{LANES, Row, max};
 use super::layer::{MarchState, SegmentLight};
 use super::shading_in_lanes::{LightsOnRay, LitCell, LitSegments};
 use crate::grid_walk::IndexRay;

@@ -1,8 +1,8 @@
 //! Direct volume rendering: emission and absorption along a ray through a uniform grid (Max 1995,
 //! "Optical Models for Direct Volume Rendering", eq. 7), front to back.
 //!
-//! Along a ray the trilinear interpolant of a cell is a cubic. It is cut where it meets the knots of
-//! the transfer function, and each part is integrated in closed form, eight at a time
+//! Along a ray the trilinear interpolant of a cell is a cubic. It is cut where it meets the knots
+//! of the transfer function, and each part is integrated in closed form, eight at a time
 //! (`cell_batch`, `linear_segment`), so thin shells are not skipped. Where knots are too dense for
 //! that, and where extinction depends on the gradient, an interval is split until it and its two
 //! parts differ by less than its share of the tolerance (`adaptive`).
@@ -13,6 +13,7 @@
 mod adaptive;
 mod brick;
 mod cell_batch;
+mod lanes;
 mod layer;
 mod linear_parts;
 mod linear_segment;

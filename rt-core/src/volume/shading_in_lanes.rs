@@ -1,6 +1,6 @@
 //! Shading by gradients, for eight cells at a time. See [`super::shading`] for one.
 
-use super::cell_batch::{LANES, Row, max};
+use super::lanes::{LANES, Row, max};
 use super::shading::corner_gradients;
 use super::{Volume, VolumeHighlight};
 use crate::grid_walk::IndexRay;
