@@ -171,6 +171,16 @@ impl Grid {
         ]
     }
 
+    /// Two neighbours along x, the first with this index in [`Grid::values`]; zeros past the end.
+    #[cfg(feature = "render")]
+    #[inline]
+    pub(crate) fn pair(&self, index: usize) -> [f32; 2] {
+        match self.values.get(index..).and_then(|v| v.first_chunk()) {
+            Some(pair) => *pair,
+            None => [0.0; 2],
+        }
+    }
+
     /// The cell of the continuous index `p`, clamped to the grid, and the position inside it
     /// (0..=1). NaN becomes 0.
     #[inline]

@@ -44,6 +44,13 @@ pub(crate) fn evaluate(b: &[f64; 4], u: f64) -> f64 {
     ((b[0] * w + 3.0 * b[1] * u) * w + 3.0 * b[2] * u * u) * w + b[3] * u * u * u
 }
 
+/// Value and slope at `u`.
+#[cfg(feature = "render")]
+#[inline]
+pub(crate) fn evaluate_with_slope(b: &[f64; 4], u: f64) -> (f64, f64) {
+    (evaluate(b, u), slope(b, u))
+}
+
 #[inline]
 fn slope(b: &[f64; 4], u: f64) -> f64 {
     let w = 1.0 - u;

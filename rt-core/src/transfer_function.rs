@@ -15,10 +15,9 @@ use crate::colormap::ColorMap;
 pub struct TransferFunction {
     colors: ColorMap,
     extinction: Vec<[f32; 2]>,
-    intervals: Vec<Interval>,
-    /// For evenly spaced scalars from `buckets.lo`: the interval where the search starts, and how
-    /// many buckets before this one have any extinction.
-    buckets: Buckets,
+    exact: Pieces,
+    /// With fewer knots, to [`SIMPLIFIED_COLOR`] and [`SIMPLIFIED_EXTINCTION`].
+    simplified: Pieces,
 }
 
 /// Why a transfer function cannot be used.
@@ -56,19 +55,34 @@ pub enum TransferFunctionError {
     ColorRange([f32; 2]),
 }
 
-/// An interval of scalars, starting at `s`, in which extinction and extinction times colour are
-/// polynomials.
+/// Colour and extinction as linear pieces.
+#[derive(Debug, Clone)]
+pub(crate) struct Pieces {
+    intervals: Vec<Interval>,
+    /// For evenly spaced scalars from `buckets.lo`: the interval where the search starts, and how
+    /// many buckets before this one have any extinction.
+    buckets: Buckets,
+}
+
+/// An interval of scalars, starting at `s`, in which extinction and colour are linear.
 #[derive(Debug, Clone, Copy)]
-struct Interval {
-    s: f64,
+pub(crate) struct Interval {
+    pub(crate) s: f64,
     /// Extinction at `s`, and its slope.
-    sigma: [f64; 2],
+    pub(crate) sigma: [f64; 2],
     /// Colour at `s`, and its slope.
-    color: [[f64; 2]; 3],
+    pub(crate) color: [[f64; 2]; 3],
     /// ∫σ, ∫σr, ∫σg, ∫σb up to `s`.
     sums: [f64; 4],
     /// Sum of the heights of the steps of σ up to and at `s`.
     steps: f64,
+}
+
+impl Interval {
+    /// A piece without its integrals.
+    pub(crate) fn linear(s: f64, sigma: [f64; 2], color: [[f64; 2]; 3]) -> Interval {
+        Interval { s, sigma, color, sums: [0.0; 4], steps: 0.0 }
+    }
 }
 
 #[derive(Debug, Clone)]
@@ -80,9 +94,15 @@ struct Buckets {
 }
 
 const BUCKETS: usize = 1024;
+const LAST_BUCKET: f64 = (BUCKETS - 1) as f64;
 /// Parts of one interval of a logarithmic colour map or of an opacity ramp, which are not linear in
 /// what is stored.
 const CURVED_PARTS: usize = 16;
+/// Largest error of a colour in the simplified pieces: a twentieth of a level of 1/255.
+const SIMPLIFIED_COLOR: f64 = 2e-4;
+/// Largest relative error of an extinction in the simplified pieces. An opacity changes by at most
+/// 1/e of it, a twentieth of a level.
+const SIMPLIFIED_EXTINCTION: f64 = 5e-4;
 /// Opacity 1 would be infinite extinction; a millionth of the light passes instead.
 const MAX_OPACITY: f32 = 0.999_999;
 
@@ -106,9 +126,10 @@ impl TransferFunction {
         if !range_ok {
             return Err(TransferFunctionError::ColorRange(colors.range));
         }
-        let intervals = intervals(&colors, &extinction);
-        let buckets = buckets(&intervals);
-        Ok(TransferFunction { colors, extinction, intervals, buckets })
+        let knots = knots(&colors, &extinction);
+        let simplified = Pieces::new(&simplify(&knots, &colors, &extinction), &colors, &extinction);
+        let exact = Pieces::new(&knots, &colors, &extinction);
+        Ok(TransferFunction { colors, extinction, exact, simplified })
     }
 
     /// `opacity` holds [scalar, opacity of a slab `unit_distance` thick], 0..=1, linear between, as
@@ -149,19 +170,29 @@ impl TransferFunction {
         extinction_at(&self.extinction, scalar)
     }
 
-    /// Whether there is any extinction for scalars in `lo..=hi`. May return true when extinction
-    /// lies only within a thousandth of the range.
+    /// Colour and extinction as linear pieces: exact, or with fewer knots and an error of at most a
+    /// tenth of a level.
+    pub(crate) fn pieces(&self, simplified: bool) -> &Pieces {
+        if simplified { &self.simplified } else { &self.exact }
+    }
+
+    /// See [`Pieces::is_clear`].
     #[inline]
     pub(crate) fn is_clear(&self, lo: f64, hi: f64) -> bool {
-        let b = &self.buckets;
+        self.exact.is_clear(lo, hi)
+    }
+
+    /// Whether there is extinction at all scalars in `lo..=hi`, as far as the buckets tell.
+    pub(crate) fn is_nowhere_clear(&self, lo: f64, hi: f64) -> bool {
+        let b = &self.exact.buckets;
         let (a, z) = (b.index(lo), b.index(hi));
-        b.occupied_before[z + 1] == b.occupied_before[a]
+        lo <= hi && (b.occupied_before[z + 1] - b.occupied_before[a]) as usize == z + 1 - a
     }
 
     /// ∫σ, ∫σr, ∫σg, ∫σb over the scalars up to `s`, from some fixed scalar on.
     #[inline]
     pub(crate) fn integral(&self, s: f64) -> [f64; 4] {
-        let p = self.interval(s);
+        let p = self.exact.interval(s);
         let x = s - p.s;
         let [e0, e1] = p.sigma;
         let mut r = p.sums;
@@ -178,7 +209,7 @@ impl TransferFunction {
     /// Extinction and colour at `s`.
     #[inline]
     pub(crate) fn sample(&self, s: f64) -> (f64, [f64; 3]) {
-        let p = self.interval(s);
+        let p = self.exact.interval(s);
         let x = s - p.s;
         (p.sigma[0] + p.sigma[1] * x, p.color.map(|c| c[0] + c[1] * x))
     }
@@ -186,37 +217,69 @@ impl TransferFunction {
     /// Scalars closer than this have no measurable difference of integrals.
     #[inline]
     pub(crate) fn resolution(&self) -> f64 {
-        1e-4 / self.buckets.per_scalar
+        1e-4 / self.exact.buckets.per_scalar
     }
 
     /// Whether colour or extinction bend or jump between two scalars.
     #[inline]
     pub(crate) fn has_knot_between(&self, lo: f64, hi: f64) -> bool {
-        self.interval(lo).s != self.interval(hi).s
+        self.exact.interval(lo).s != self.exact.interval(hi).s
     }
 
     /// Sum of the heights of the steps of extinction between two scalars.
     #[inline]
     pub(crate) fn steps_between(&self, lo: f64, hi: f64) -> f64 {
-        self.interval(hi).steps - self.interval(lo).steps
+        self.exact.interval(hi).steps - self.exact.interval(lo).steps
+    }
+}
+
+impl Pieces {
+    fn new(knots: &[f64], colors: &ColorMap, extinction: &[[f32; 2]]) -> Pieces {
+        let intervals = intervals(knots, colors, extinction);
+        let buckets = buckets(&intervals);
+        Pieces { intervals, buckets }
     }
 
+    /// Whether there is any extinction for scalars in `lo..=hi`. May return true when extinction
+    /// lies only within a thousandth of the range.
     #[inline]
-    fn interval(&self, s: f64) -> &Interval {
+    pub(crate) fn is_clear(&self, lo: f64, hi: f64) -> bool {
+        let b = &self.buckets;
+        let (a, z) = (b.index(lo), b.index(hi));
+        b.occupied_before[z + 1] == b.occupied_before[a]
+    }
+
+    /// Number of the piece at `s`.
+    #[inline]
+    pub(crate) fn number_at(&self, s: f64) -> usize {
         let mut i = self.buckets.first_piece[self.buckets.index(s)] as usize;
         while i + 1 < self.intervals.len() && self.intervals[i + 1].s <= s {
             i += 1;
         }
-        &self.intervals[i]
+        i
+    }
+
+    #[inline]
+    fn interval(&self, s: f64) -> &Interval {
+        &self.intervals[self.number_at(s)]
+    }
+
+    /// The pieces, by scalar.
+    #[inline]
+    pub(crate) fn all(&self) -> &[Interval] {
+        &self.intervals
     }
 }
 
 impl Buckets {
     #[inline]
     fn index(&self, s: f64) -> usize {
-        // `as` saturates: below the first bucket is 0. Bucket 0 and the last one represent
-        // everything outside.
-        (((s - self.lo) * self.per_scalar) as usize).min(BUCKETS - 1)
+        // Bucket 0 and the last one represent everything outside; NaN is in the first. Between
+        // these limits the conversion to i32 is one instruction, to usize it is not.
+        let place = (s - self.lo) * self.per_scalar;
+        let place = if place > 0.0 { place } else { 0.0 };
+        let place = if place < LAST_BUCKET { place } else { LAST_BUCKET };
+        place as i32 as usize & (BUCKETS - 1)
     }
 }
 
@@ -262,9 +325,8 @@ fn extinction_at(points: &[[f32; 2]], s: f64) -> f64 {
     }
 }
 
-/// Splits the scalars at every knot of extinction and colour.
-fn intervals(colors: &ColorMap, extinction: &[[f32; 2]]) -> Vec<Interval> {
-    // Where the colour bends.
+/// Where extinction or colour bend, in order.
+fn knots(colors: &ColorMap, extinction: &[[f32; 2]]) -> Vec<f64> {
     let [lo, hi] = colors.range.map(f64::from);
     let intervals = (colors.colors.len() - 1) * if colors.log { CURVED_PARTS } else { 1 };
     let mut knots: Vec<f64> = extinction.iter().map(|p| f64::from(p[0])).collect();
@@ -274,20 +336,31 @@ fn intervals(colors: &ColorMap, extinction: &[[f32; 2]]) -> Vec<Interval> {
     }
     knots.sort_by(f64::total_cmp);
     knots.dedup();
-    let largest = knots[0].abs().max(knots[knots.len() - 1].abs());
-    let span =
-        (knots[knots.len() - 1] - knots[0]).max(1e-5 * largest).max(f64::from(f32::MIN_POSITIVE));
-    // Constant intervals on either side, wide enough for f32 scalars to be far inside.
-    let mut all = vec![knots[0] - span];
-    all.extend(&knots);
+    knots
+}
 
-    // Limits from inside each interval, so that steps stay steps; a colour map of zero width is
-    // also a step.
-    let color_at = |s: f32| -> [f64; 3] {
-        let c = colors.lookup(s);
+/// Extinction and colour just before and just after a scalar.
+struct Limits<'a> {
+    colors: &'a ColorMap,
+    extinction: &'a [[f32; 2]],
+}
+
+impl Limits<'_> {
+    fn color_before(&self, s: f64) -> [f64; 3] {
+        self.color_at((s as f32).next_down())
+    }
+
+    fn color_after(&self, s: f64) -> [f64; 3] {
+        self.color_at((s as f32).next_up())
+    }
+
+    fn color_at(&self, s: f32) -> [f64; 3] {
+        let c = self.colors.lookup(s);
         [c[0], c[1], c[2]].map(f64::from)
-    };
-    let left_limit = |s: f64| -> f64 {
+    }
+
+    fn extinction_before(&self, s: f64) -> f64 {
+        let extinction = self.extinction;
         let before = extinction.partition_point(|p| f64::from(p[0]) < s);
         match (before.checked_sub(1).map(|i| extinction[i].map(f64::from)), extinction.get(before))
         {
@@ -298,20 +371,87 @@ fn intervals(colors: &ColorMap, extinction: &[[f32; 2]]) -> Vec<Interval> {
             }
             (None, None) => 0.0,
         }
+    }
+
+    fn extinction_after(&self, s: f64) -> f64 {
+        extinction_at(self.extinction, s)
+    }
+}
+
+/// Leaves out knots that lie nearly on the line between their neighbours: tables of 1,024 entries,
+/// as VTK makes them, mostly have few real bends. A knot is kept when the next one lies outside the
+/// directions in which all knots since the last kept one are met within their tolerances, so the
+/// cost is linear in the number of knots.
+fn simplify(knots: &[f64], colors: &ColorMap, extinction: &[[f32; 2]]) -> Vec<f64> {
+    let limits = Limits { colors, extinction };
+    // Extinction and colour on both sides of a knot.
+    let values = |s: f64| {
+        let four = |sigma: f64, [r, g, b]: [f64; 3]| [sigma, r, g, b];
+        let before = four(limits.extinction_before(s), limits.color_before(s));
+        (before, four(limits.extinction_after(s), limits.color_after(s)))
     };
+    let tolerance = |v: &[f64; 4]| -> [f64; 4] {
+        std::array::from_fn(|c| match c {
+            0 => SIMPLIFIED_EXTINCTION * v[0],
+            _ => SIMPLIFIED_COLOR * v[c].abs().max(1.0),
+        })
+    };
+    let Some(&first) = knots.first() else { return Vec::new() };
+    let mut kept = vec![first];
+    let (mut start, mut from) = (first, values(first).1);
+    let mut directions = [[f64::NEG_INFINITY, f64::INFINITY]; 4];
+    for pair in knots[1..].windows(2) {
+        let [s, next] = [pair[0], pair[1]];
+        let (before, after) = values(s);
+        let near = tolerance(&before);
+        let width = s - start;
+        for (c, d) in directions.iter_mut().enumerate() {
+            let rise = before[c] - from[c];
+            *d = [d[0].max((rise - near[c]) / width), d[1].min((rise + near[c]) / width)];
+        }
+        // The colours were looked up at the neighbouring f32.
+        let steps = (0..4).any(|c| (after[c] - before[c]).abs() > near[c]);
+        let to = values(next).0;
+        let straight = (0..4).all(|c| {
+            let slope = (to[c] - from[c]) / (next - start);
+            directions[c][0] <= slope && slope <= directions[c][1]
+        });
+        if steps || !straight {
+            kept.push(s);
+            (start, from) = (s, after);
+            directions = [[f64::NEG_INFINITY, f64::INFINITY]; 4];
+        }
+    }
+    if knots.len() > 1 {
+        kept.push(knots[knots.len() - 1]);
+    }
+    kept
+}
+
+/// Splits the scalars at `knots`.
+fn intervals(knots: &[f64], colors: &ColorMap, extinction: &[[f32; 2]]) -> Vec<Interval> {
+    let largest = knots[0].abs().max(knots[knots.len() - 1].abs());
+    let span =
+        (knots[knots.len() - 1] - knots[0]).max(1e-5 * largest).max(f64::from(f32::MIN_POSITIVE));
+    // Constant intervals on either side, wide enough for f32 scalars to be far inside.
+    let mut all = vec![knots[0] - span];
+    all.extend(knots);
+
+    // Limits from inside each interval, so that steps stay steps; a colour map of zero width is
+    // also a step.
+    let limits = Limits { colors, extinction };
     let mut intervals: Vec<Interval> = Vec::with_capacity(all.len());
     let (mut sums, mut steps, mut sigma_before) = ([0.0; 4], 0.0, None);
     for (i, &s) in all.iter().enumerate() {
         let end = all.get(i + 1).copied();
-        let sigma0 = extinction_at(extinction, s);
+        let sigma0 = limits.extinction_after(s);
         let (sigma0, sigma1) = match end {
-            Some(e) if i == 0 => (left_limit(e), left_limit(e)),
-            Some(e) => (sigma0, left_limit(e)),
+            Some(e) if i == 0 => (limits.extinction_before(e), limits.extinction_before(e)),
+            Some(e) => (sigma0, limits.extinction_before(e)),
             None => (sigma0, sigma0),
         };
-        let color1 = end.map(|e| color_at((e as f32).next_down()));
-        let color0 =
-            if i == 0 { color1 } else { None }.unwrap_or_else(|| color_at((s as f32).next_up()));
+        let color1 = end.map(|e| limits.color_before(e));
+        let color0 = if i == 0 { color1 } else { None }.unwrap_or_else(|| limits.color_after(s));
         let color1 = color1.unwrap_or(color0);
         let width = end.map_or(1.0, |e| e - s);
         let interval = Interval {
@@ -420,6 +560,39 @@ mod tests {
                     );
                 }
             }
+        }
+    }
+
+    #[test]
+    fn simplified_pieces_are_few_and_within_their_tolerance() {
+        // As VTK's tables: 1,024 entries of a curved opacity and of curved colours.
+        let table = |f: f64| {
+            let s = f as f32;
+            [s, 0.5 + 0.5 * (3.0 * s).sin(), (1.0 - s).powi(2), 1.0]
+        };
+        let colors = (0..1024).map(|i| table(f64::from(i) / 1023.0)).collect();
+        let sigma = |f: f64| if f < 0.3 { 0.0 } else { -(1.0 - 0.8 * (f - 0.3)).ln() };
+        let mut points: Vec<[f32; 2]> =
+            (0..1024).map(|i| f64::from(i) / 1023.0).map(|f| [f as f32, sigma(f) as f32]).collect();
+        // A step, which must stay one.
+        points.insert(800, [points[800][0], 0.1]);
+        let tf = TransferFunction::new(ColorMap::new(colors, [0.0, 1.0]), points).unwrap();
+        let (exact, simplified) = (tf.pieces(false), tf.pieces(true));
+        let (all, few) = (exact.all().len(), simplified.all().len());
+        assert!(all > 1000 && few < 80, "{all} {few}");
+        for k in 0..30_000 {
+            let s = f64::from(k) / 29_000.0 - 0.01;
+            let at = |p: &Pieces| {
+                let p = *p.interval(s);
+                let x = s - p.s;
+                (p.sigma[0] + p.sigma[1] * x, p.color.map(|c| c[0] + c[1] * x))
+            };
+            let ((sigma, color), (sigma2, color2)) = (at(exact), at(simplified));
+            assert!((sigma - sigma2).abs() <= 1.001 * SIMPLIFIED_EXTINCTION * sigma + 1e-9, "{s}");
+            for c in 0..3 {
+                assert!((color[c] - color2[c]).abs() <= 1.001 * SIMPLIFIED_COLOR, "{s}");
+            }
+            assert_eq!(sigma == 0.0, sigma2 == 0.0, "{s}: what is clear stays clear");
         }
     }
 

@@ -7,6 +7,7 @@ use glam::{DVec3, UVec3, Vec3};
 use rt_core::colormap::ColorMap;
 use rt_core::grid::Grid;
 use rt_core::ray::Ray;
+use rt_core::simd::SimdLevel;
 use rt_core::transfer_function::TransferFunction;
 use rt_core::volume::{
     Interpolation, Volume, VolumeError, VolumeOptions, VolumeQuality, VolumeSample, VolumeShading,
@@ -469,4 +470,59 @@ fn bounds_and_origin_are_the_grids() {
             && b.max.cmpgt(Vec3::splat(2.0)).all()
             && (b.extent() - 2.0).length() < 1e-5
     );
+}
+
+/// A table of 1,024 entries, as VTK hands them on: curved colours and a curved opacity.
+fn table() -> TransferFunction {
+    let at = |i: usize| i as f32 / 1023.0;
+    let color = |f: f32| [f, 0.5 + 0.5 * (4.0 * f).sin(), (1.0 - f) * (1.0 - f), 1.0];
+    let colors = ColorMap::new((0..1024).map(|i| color(at(i))).collect(), [-1.0, 1.0]);
+    let sigma = |f: f32| -(1.0 - 0.4 * f * f).ln();
+    let points = (0..1024).map(|i| [2.0 * at(i) - 1.0, sigma(at(i))]).collect();
+    TransferFunction::new(colors, points).unwrap()
+}
+
+#[test]
+fn tables_with_many_entries_stay_within_the_tolerance() {
+    for (n, grid) in fields().into_iter().enumerate() {
+        let v = Volume::new(grid.into(), table(), VolumeOptions::default()).unwrap();
+        for ray in rays(&mut Random::new(8), 40) {
+            let exact = integrate_reference(&v, &ray, 0.0, INF, 1.0 / 256.0);
+            // At 0.05 levels the table's own knots are integrated.
+            for levels in [0.5, 0.05] {
+                let s = v.integrate(&ray, 0.0, INF, &tolerance(levels));
+                let off = 255.0 * worst(s.rgba, exact);
+                assert!(off <= f64::from(levels), "field {n}: {off} of {levels}, {ray:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn volumes_have_the_same_bits_with_every_instruction_set() {
+    let shading = VolumeShading {
+        ambient: 0.3,
+        diffuse: 0.6,
+        specular: 0.4,
+        shininess: 20.0,
+        ..VolumeShading::default()
+    };
+    for grid in fields() {
+        for shading in [None, Some(shading)] {
+            for points in transfers() {
+                let tf = TransferFunction::new(rainbow(), points).unwrap();
+                let options = VolumeOptions { shading, ..VolumeOptions::default() };
+                let best = Volume::new(grid.clone().into(), tf, options).unwrap();
+                for level in SimdLevel::available() {
+                    let v = best.clone().with_simd_level(Some(level)).unwrap();
+                    for ray in rays(&mut Random::new(9), 30) {
+                        let [a, b] =
+                            [&best, &v].map(|v| v.integrate(&ray, 0.0, INF, &tolerance(0.5)));
+                        assert_eq!(a.rgba.map(f32::to_bits), b.rgba.map(f32::to_bits), "{level:?}");
+                        assert_eq!((a.depth, a.samples), (b.depth, b.samples), "{level:?}");
+                    }
+                }
+            }
+        }
+    }
 }

@@ -4,6 +4,8 @@
     reason = "one of the workspace's rooms for unsafe code: each block says why it is sound"
 )]
 
+#[cfg(feature = "render")]
+pub(crate) mod exponential;
 pub(crate) mod huge_pages;
 mod prefetch;
 mod stack;

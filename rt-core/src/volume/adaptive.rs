@@ -14,7 +14,6 @@
 use super::Volume;
 use super::layer::{Layer, MarchState};
 use super::shading::ShadingCurve;
-use crate::grid_walk::Crossing;
 use crate::ray_cubic;
 
 /// Where an interval is split. Not in the middle: an antisymmetric cubic passes through the middle
@@ -45,24 +44,24 @@ struct CubicSegment {
 }
 
 impl Volume {
-    /// Adds the cell `c`, along which the scalar is the cubic `b`.
+    /// Adds a cell, along which the scalar is the cubic `b`.
     pub(super) fn march_adaptive(
         &self,
         lit: Option<&ShadingCurve<'_>>,
         per_t: f64,
-        c: &Crossing,
+        [t0, t1]: [f64; 2],
         b: &[f64; 4],
         m: &mut MarchState,
     ) {
         let ends = [self.transfer.integral(b[0]), self.transfer.integral(b[3])];
-        let layer = self.layer(lit, per_t, c.t0, c.t1, b, &ends);
+        let layer = self.layer(lit, per_t, t0, t1, b, &ends);
         m.samples += 1;
         // An error at one point of a cell, not all along it, may use half of the cell's share of
         // the tolerance.
-        let local_share = 0.5 * m.error_per_length * (c.t1 - c.t0) * per_t;
+        let local_share = 0.5 * m.error_per_length * (t1 - t0) * per_t;
         // Depth first with the near part on top: the stack holds one far part per level.
         let mut stack =
-            [CubicSegment { ta: c.t0, tb: c.t1, b: *b, ends, layer, splits: 0 }; MAX_SPLITS + 1];
+            [CubicSegment { ta: t0, tb: t1, b: *b, ends, layer, splits: 0 }; MAX_SPLITS + 1];
         let mut height = 1;
         while height > 0 && !m.is_opaque() {
             height -= 1;

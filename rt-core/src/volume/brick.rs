@@ -163,8 +163,10 @@ impl Volume {
             first_point: low,
             ranges,
             occupied: Vec::new(),
+            filled: Vec::new(),
             blocks: self.blocks,
             report,
+            level: self.level,
         };
         part.find_occupied();
         part

@@ -39,6 +39,22 @@ impl Layer {
     }
 }
 
+/// What a segment of a ray emits towards the viewer, and how much light passes through it.
+pub(super) struct SegmentLight {
+    pub(super) t: [f64; 2],
+    /// Emission that leaves the segment.
+    pub(super) color: [f64; 3],
+    /// Share of the light behind that passes.
+    pub(super) attenuation: f64,
+    /// Optical thickness, and extinction at both ends.
+    pub(super) tau: f64,
+    pub(super) ends: [f64; 2],
+}
+
+/// Tolerance from which the simplified transfer function is used, in levels. It is off by a
+/// tenth of a level at most, so a fifth of the tolerance.
+const SIMPLIFIED_FROM: f32 = 0.5;
+
 /// State of a ray during the march.
 pub(super) struct MarchState {
     pub(super) color: [f64; 3],
@@ -72,6 +88,30 @@ impl MarchState {
     #[inline]
     pub(super) fn is_opaque(&self) -> bool {
         self.transmittance < self.opaque_below
+    }
+
+    /// Whether the error of the simplified transfer function is small against the tolerance.
+    #[inline]
+    pub(super) fn allows_simplified(&self) -> bool {
+        matches!(self.quality, VolumeQuality::Tolerance { levels } if levels >= SIMPLIFIED_FROM)
+    }
+
+    #[inline]
+    pub(super) fn add_segment(&mut self, s: &SegmentLight) {
+        let before = self.transmittance;
+        for (sum, c) in self.color.iter_mut().zip(s.color) {
+            *sum += before * c;
+        }
+        self.transmittance = before * s.attenuation;
+        if before > 0.5 && self.transmittance <= 0.5 {
+            // Where the segment's own thickness is ln(2T), for extinction linear between its ends.
+            let share = ((2.0 * before).ln() / s.tau).min(1.0);
+            let [near, far] = s.ends;
+            let wanted = share * (near + far);
+            let root = (near * near + (far - near) * wanted).max(0.0).sqrt();
+            let at = if near + root > 0.0 { wanted / (near + root) } else { share };
+            self.depth = s.t[0] + (s.t[1] - s.t[0]) * at.clamp(0.0, 1.0);
+        }
     }
 
     #[inline]

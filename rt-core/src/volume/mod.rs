@@ -1,23 +1,28 @@
 //! Direct volume rendering: emission and absorption along a ray through a uniform grid (Max 1995,
 //! "Optical Models for Direct Volume Rendering", eq. 7), front to back.
 //!
-//! Along a ray the trilinear interpolant of a cell is a cubic. It is split until each interval is
-//! nearly straight, and over such intervals the transfer function is integrated exactly
-//! ([`TransferFunction`]), so thin shells are not skipped. An interval is nearly straight when it
-//! and its two parts differ by less than its share of the tolerance; steps of the transfer function
-//! are taken into account where they are.
+//! Along a ray the trilinear interpolant of a cell is a cubic. It is cut where it meets the knots
+//! of the transfer function, and each part is integrated in closed form, eight at a time
+//! (`cell_batch`, `linear_segment`), so thin shells are not skipped. Where knots are too dense for
+//! that, and where extinction depends on the gradient, an interval is split until it and its two
+//! parts differ by less than its share of the tolerance (`adaptive`).
 //!
 //! Empty space is skipped by blocks of cells ([`MACROCELL`]) whose range of values has no
 //! extinction, then by cells.
 
 mod adaptive;
 mod brick;
+mod cell_batch;
+mod lanes;
 mod layer;
+mod linear_parts;
+mod linear_segment;
 mod options;
 mod projection;
 mod ray_segments;
 mod reference;
 mod shading;
+mod shading_in_lanes;
 
 pub use brick::{Brick, PartialIntegral};
 pub use options::{
@@ -33,9 +38,13 @@ use crate::math::Aabb;
 use crate::ray::Ray;
 use crate::ray_cubic;
 use crate::shapes::outward_box;
+use crate::simd::{SimdLevel, UnavailableLevel};
 use crate::transfer_function::TransferFunction;
+use cell_batch::CellBatch;
+use fearless_simd::Level;
 use glam::{DVec3, UVec3};
 use layer::{Layer, MarchState};
+use linear_segment::RayInLanes;
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -133,8 +142,12 @@ pub struct Volume {
     ranges: Vec<[f32; 2]>,
     /// Whether a block has any extinction.
     occupied: Vec<bool>,
+    /// Whether a block has extinction at all scalars of its range, so that none of its cells is
+    /// clear.
+    filled: Vec<bool>,
     blocks: UVec3,
     report: VolumeReport,
+    level: Level,
 }
 
 impl Volume {
@@ -177,8 +190,10 @@ impl Volume {
             first_point: UVec3::ZERO,
             ranges,
             occupied: Vec::new(),
+            filled: Vec::new(),
             blocks,
             report,
+            level: Level::new(),
         };
         v.find_occupied();
         Ok(v)
@@ -190,9 +205,18 @@ impl Volume {
         self.find_occupied();
     }
 
+    /// The same volume, integrated with no more than the instruction set `level`; `None` for the
+    /// machine's best. Results have the same bits with all of them.
+    pub fn with_simd_level(mut self, level: Option<SimdLevel>) -> Result<Self, UnavailableLevel> {
+        self.level = SimdLevel::resolve(level)?;
+        Ok(self)
+    }
+
     fn find_occupied(&mut self) {
         let clear = |r: &[f32; 2]| r[0] > r[1] || self.transfer.is_clear(r[0].into(), r[1].into());
         self.occupied = self.ranges.iter().map(|r| !clear(r)).collect();
+        let filled = |r: &[f32; 2]| self.transfer.is_nowhere_clear(r[0].into(), r[1].into());
+        self.filled = self.ranges.iter().map(filled).collect();
         self.report.macrocells_clear = self.occupied.iter().filter(|o| !**o).count() as u64;
     }
 
@@ -291,35 +315,76 @@ impl Volume {
         if inside.1 <= inside.0 {
             return m;
         }
+        let ray = self.ray_in_lanes(&index_ray, per_t);
+        let mut batch = CellBatch::new();
         index_ray.walk([0; 3], cells, cells, i64::from(MACROCELL), t0, t1, |passed| {
             let block = UVec3::from_array(passed.cell.map(|c| c as u32 / MACROCELL));
-            self.march_block(&index_ray, per_t, inside.0, block, [passed.t0, passed.t1], &mut m);
+            let span = [passed.t0, passed.t1];
+            self.enter_block(&ray, inside.0, block, span, &mut batch, &mut m);
             !m.is_opaque()
         });
+        self.finish_batch(&ray, &mut batch, &mut m);
         m
+    }
+
+    /// A ray with what is the same all along it.
+    fn ray_in_lanes<'a>(&self, index_ray: &'a IndexRay, per_t: f64) -> RayInLanes<'a> {
+        RayInLanes { index_ray, per_t, lights: self.lights_on(index_ray) }
     }
 
     /// Continues from `ta` to `tb`, within one block. The ray enters the grid at `anchor`.
     fn march_block(
         &self,
-        ray: &IndexRay,
-        per_t: f64,
+        ray: &RayInLanes<'_>,
+        anchor: f64,
+        block: UVec3,
+        span: [f64; 2],
+        m: &mut MarchState,
+    ) {
+        let mut batch = CellBatch::new();
+        self.enter_block(ray, anchor, block, span, &mut batch, m);
+        self.finish_batch(ray, &mut batch, m);
+    }
+
+    /// [`Volume::march_block`], which may leave the last cells in `batch`.
+    fn enter_block(
+        &self,
+        ray: &RayInLanes<'_>,
         anchor: f64,
         block: UVec3,
         [ta, tb]: [f64; 2],
+        batch: &mut CellBatch,
         m: &mut MarchState,
     ) {
-        if !(self.occupied[self.block_index(block)] && tb > ta) {
+        let index = self.block_index(block);
+        if !(self.occupied[index] && tb > ta) {
             return;
         }
         let cells = self.cells().to_array().map(i64::from);
         let size = i64::from(MACROCELL);
         let first = block.to_array().map(|b| i64::from(b) * size);
         let end = std::array::from_fn(|a| (first[a] + size).min(cells[a]));
-        ray.walk(first, end, cells, 1, ta, tb, |cell| {
-            self.march_cell(ray, per_t, anchor, cell, m);
-            !m.is_opaque()
-        });
+        if self.marches_in_lanes(m.quality) {
+            let pieces = self.transfer.pieces(m.allows_simplified());
+            let pieces = (!self.filled[index]).then_some(pieces);
+            ray.index_ray.walk(first, end, cells, 1, ta, tb, |cell| {
+                self.collect_cell(ray, pieces, cell, batch, m);
+                !m.is_opaque()
+            });
+        } else {
+            ray.index_ray.walk(first, end, cells, 1, ta, tb, |cell| {
+                self.march_cell(ray.index_ray, ray.per_t, anchor, cell, m);
+                !m.is_opaque()
+            });
+        }
+    }
+
+    /// Whether cells are integrated in closed form. Fixed steps and nearest values are not
+    /// integrated, and extinction that depends on the gradient is not linear in the scalar.
+    fn marches_in_lanes(&self, quality: VolumeQuality) -> bool {
+        matches!(quality, VolumeQuality::Tolerance { .. })
+            && !self.is_nearest()
+            && self.options.gradient_opacity.is_none()
     }
 
     #[inline]
@@ -361,7 +426,9 @@ impl Volume {
         }
         let light = self.light_along(ray, stored, [c.t0, c.t1], &p, &q);
         match m.quality {
-            VolumeQuality::Tolerance { .. } => self.march_adaptive(light.as_ref(), per_t, c, &b, m),
+            VolumeQuality::Tolerance { .. } => {
+                self.march_adaptive(light.as_ref(), per_t, [c.t0, c.t1], &b, m);
+            }
             VolumeQuality::Step { voxels } => {
                 // Samples lie at multiples of the step from where the ray enters the grid, clipped
                 // at cell faces.

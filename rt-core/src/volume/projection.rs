@@ -222,7 +222,7 @@ impl Volume {
 }
 
 /// The turning points of a cubic between 0 and 1, in order, and their number.
-fn turns(b: &[f64; 4]) -> ([f64; 2], usize) {
+pub(super) fn turns(b: &[f64; 4]) -> ([f64; 2], usize) {
     // Its derivative in Bernstein form, as a + 2 h u + c u².
     let [d0, d1, d2] = [b[1] - b[0], b[2] - b[1], b[3] - b[2]];
     let (a, h, c) = (d0, d1 - d0, d0 - 2.0 * d1 + d2);

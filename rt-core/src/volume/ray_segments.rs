@@ -9,6 +9,7 @@
 //! process.)
 
 use super::layer::{Layer, MarchState};
+use super::linear_segment::RayInLanes;
 use super::{MACROCELL, PartialIntegral, Volume, VolumeQuality, VolumeSample};
 use crate::grid_walk::IndexRay;
 use crate::ray::Ray;
@@ -228,6 +229,8 @@ impl<'a> RaySegments<'a> {
         }
         // The error budget of all volumes is distributed by length along the ray.
         let per_t = m.error_per_length;
+        let rays: Vec<_> =
+            self.per_volume.iter().map(|s| s.volume.ray_in_lanes(&s.ray, s.per_t)).collect();
         let mut there: Vec<(usize, UVec3)> = Vec::with_capacity(self.per_volume.len());
         self.walk(|number, ta, tb, here| {
             if number < spans.start || number >= spans.end {
@@ -243,18 +246,12 @@ impl<'a> RaySegments<'a> {
                     let segments = &self.per_volume[v];
                     m.error_per_length =
                         MarchState::new(*quality, self.path * segments.per_t).error_per_length;
-                    segments.volume.march_block(
-                        &segments.ray,
-                        segments.per_t,
-                        segments.anchor,
-                        block,
-                        [ta, tb],
-                        &mut m,
-                    );
+                    segments.volume.march_block(&rays[v], segments.anchor, block, [ta, tb], &mut m);
                 }
                 _ => {
                     m.error_per_length = per_t;
-                    let media_mixer = MediaMixer { segments: self, there: &there, quality };
+                    let media_mixer =
+                        MediaMixer { segments: self, rays: &rays, there: &there, quality };
                     let one = media_mixer.mix(ta, tb, &mut m.samples);
                     media_mixer.descend(ta, tb, one, 0, &mut m);
                 }
@@ -268,6 +265,8 @@ impl<'a> RaySegments<'a> {
 /// A span with several media.
 struct MediaMixer<'a> {
     segments: &'a RaySegments<'a>,
+    /// The ray through each volume.
+    rays: &'a [RayInLanes<'a>],
     there: &'a [(usize, UVec3)],
     quality: &'a VolumeQuality,
 }
@@ -311,14 +310,7 @@ impl MediaMixer<'_> {
         for &(v, block) in self.there {
             let segments = &self.segments.per_volume[v];
             let mut m = MarchState::new(quality, (tb - ta) * segments.per_t);
-            segments.volume.march_block(
-                &segments.ray,
-                segments.per_t,
-                segments.anchor,
-                block,
-                [ta, tb],
-                &mut m,
-            );
+            segments.volume.march_block(&self.rays[v], segments.anchor, block, [ta, tb], &mut m);
             *samples += m.samples;
             let opacity = 1.0 - m.transmittance;
             if opacity > 0.0 {

@@ -173,23 +173,36 @@ fn corner_gradient(grid: &Grid, c: UVec3, clamped: bool) -> Vec3 {
 }
 
 /// [`corner_gradient`] at the corners of a cell, x fastest.
-fn corner_gradients(grid: &Grid, cell: UVec3, clamped: bool) -> [Vec3; 8] {
+pub(super) fn corner_gradients(grid: &Grid, cell: UVec3, clamped: bool) -> [Vec3; 8] {
     let corner = |i: usize| cell + UVec3::new(i as u32 & 1, i as u32 >> 1 & 1, i as u32 >> 2 & 1);
     if cell.cmpeq(UVec3::ZERO).any() || (cell + 2).cmpge(grid.dims).any() {
         return std::array::from_fn(|i| corner_gradient(grid, corner(i), clamped));
     }
-    // Inside the grid, no index needs a check.
+    // Inside the grid: the lines of four points along x around the cell.
     let (row, slab) = (grid.dims.x as usize, grid.dims.x as usize * grid.dims.y as usize);
     let first = grid.index(cell.x - 1, cell.y - 1, cell.z - 1);
-    let Some(v) = grid.values.get(first..first + 3 * slab + 3 * row + 4) else {
-        return [Vec3::ZERO; 8];
-    };
+    let mut lines = [[[0f32; 4]; 4]; 4];
+    for (z, lines) in lines.iter_mut().enumerate() {
+        for (y, line) in lines.iter_mut().enumerate() {
+            // The four at the edges are not used.
+            let is_used = (1..3).contains(&y) || (1..3).contains(&z);
+            let from = first + z * slab + y * row;
+            if is_used && let Some(four) = grid.values.get(from..).and_then(|v| v.first_chunk()) {
+                *line = *four;
+            }
+        }
+    }
     let width = 2.0 * grid.spacing.as_vec3();
-    std::array::from_fn(|i| {
-        let at = slab * (1 + (i >> 2 & 1)) + row * (1 + (i >> 1 & 1)) + 1 + (i & 1);
-        let difference = |step: usize| v[at + step] - v[at - step];
-        Vec3::new(difference(1), difference(row), difference(slab)) / width
-    })
+    let mut gradients = [Vec3::ZERO; 8];
+    for (i, g) in gradients.iter_mut().enumerate() {
+        let (x, y, z) = (1 + (i & 1), 1 + (i >> 1 & 1), 1 + (i >> 2 & 1));
+        *g = Vec3::new(
+            lines[z][y][x + 1] - lines[z][y][x - 1],
+            lines[z][y + 1][x] - lines[z][y - 1][x],
+            lines[z + 1][y][x] - lines[z - 1][y][x],
+        ) / width;
+    }
+    gradients
 }
 
 #[cfg(test)]
