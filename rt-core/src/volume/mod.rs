@@ -19,7 +19,7 @@ mod ray_segments;
 mod reference;
 mod shading;
 
-pub use brick::{Brick, PartialIntegral};
+pub use brick::{Brick, GridExtent, PartialIntegral};
 pub use options::{
     Blend, GradientOpacity, Interpolation, VolumeError, VolumeHighlight, VolumeLight,
     VolumeOptions, VolumeShading,
@@ -129,10 +129,13 @@ pub struct Volume {
     origin: DVec3,
     /// Point of the whole volume where `grid` begins.
     first_point: UVec3,
+    /// The blocks of `ranges` and `occupied`: all of them, unless this is a part.
+    held: Brick,
     /// Smallest and largest finite value of each block, x fastest.
     ranges: Vec<[f32; 2]>,
     /// Whether a block has any extinction.
     occupied: Vec<bool>,
+    /// Per axis of the whole volume.
     blocks: UVec3,
     report: VolumeReport,
 }
@@ -175,6 +178,7 @@ impl Volume {
             dims,
             origin,
             first_point: UVec3::ZERO,
+            held: Brick { first: UVec3::ZERO, end: blocks },
             ranges,
             occupied: Vec::new(),
             blocks,
@@ -216,6 +220,11 @@ impl Volume {
     /// The transfer function.
     pub fn transfer_function(&self) -> &TransferFunction {
         &self.transfer
+    }
+
+    /// Interpolation, shading and blending.
+    pub fn options(&self) -> &VolumeOptions {
+        &self.options
     }
 
     /// Sizes, and cells left out.
@@ -309,7 +318,7 @@ impl Volume {
         [ta, tb]: [f64; 2],
         m: &mut MarchState,
     ) {
-        if !(self.occupied[self.block_index(block)] && tb > ta) {
+        if !(self.is_occupied(block) && tb > ta) {
             return;
         }
         let cells = self.cells().to_array().map(i64::from);
