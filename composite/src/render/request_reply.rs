@@ -9,8 +9,8 @@ use std::time::Duration;
 /// How often a rank that works on other threads checks their progress.
 const LOOK: Duration = Duration::from_millis(20);
 
-/// Most words that a rank may give to all ranks: 64 MiB.
-const MOST_GATHERED: usize = 1 << 24;
+/// Most words that a rank may give to all ranks: 16 MiB.
+const MOST_GATHERED: usize = 1 << 22;
 /// Longest description of a problem, bytes.
 const LONGEST_PROBLEM: usize = 2000;
 

@@ -62,7 +62,7 @@ fn settings_of(scene: &Scene) -> RankScene {
     out.materials = scene.materials.clone();
     out.lights = scene.lights.clone();
     out.environment = scene.environment.clone();
-    out.background = scene.background.clone();
+    out.background = scene.background;
     out.ambient_occlusion = scene.ambient_occlusion;
     out
 }

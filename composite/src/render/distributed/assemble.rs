@@ -132,7 +132,7 @@ fn scene_of(world: World, given: &RankScene, objects: &[MergedObject]) -> Result
     scene.materials = given.materials.clone();
     scene.lights = given.lights.clone();
     scene.environment = given.environment.clone();
-    scene.background = given.background.clone();
+    scene.background = given.background;
     scene.ambient_occlusion = given.ambient_occlusion;
     for (geometry, object) in objects.iter().enumerate() {
         if object.row.transparent {
