@@ -282,7 +282,8 @@ impl PieceDemo {
         }
         let [a, b] = totals.range.map(|v| v as f32);
         let (a, b) = if a < b { (a, b) } else { (a, a + 1.0) };
-        // Clear at the lowest value; at the highest, 0.9 of the light is lost in 1/16 of the radius.
+        // Clear at the lowest value; at the highest, a sixteenth of the radius takes 0.9 of the
+        // light.
         let colors = ColorMap::new(COLORS.to_vec(), [a, b]);
         let points = [[a, 0.0], [b, 0.9]];
         let transfer = TransferFunction::from_opacity(colors, &points, (radius / 16.0) as f32)

@@ -64,8 +64,8 @@ pub enum FrameError {
         /// Ranks of the communicator.
         ranks: usize,
     },
-    /// Ranks give different values for what must be the same on all. Every rank gets this error, and
-    /// the communicator can still be used.
+    /// Ranks give different values for what must be the same on all. Every rank gets this error,
+    /// and the communicator can still be used.
     #[error(
         "the ranks contradict each other: {what}: {field}: {values}; give the same on all ranks"
     )]
