@@ -50,7 +50,7 @@ pub(super) fn fields_of(setting: &dyn Debug) -> Vec<Field> {
     let _ = write!(fields, "{setting:#?}");
     fields.end_line();
     for field in &mut fields.all {
-        field.text.truncate(field.text.trim_end_matches([',', ' ']).len());
+        field.text = field.text.trim_start().trim_end_matches([',', ' ']).to_owned();
     }
     fields.all
 }
