@@ -235,6 +235,20 @@ impl Scene {
         }
     }
 
+    /// States that colours of `geometry` may be transparent although none that this scene holds is:
+    /// for a part of a scene whose other parts have such colours. An index without a geometry is
+    /// ignored.
+    pub fn assume_transparent_colors(&mut self, geometry: usize) {
+        if let Some(colors) = self.geometry_colors.get_mut(geometry) {
+            colors.transparent = true;
+        }
+    }
+
+    /// Whether `geometry` has transparent colours of its own.
+    pub fn has_transparent_colors(&self, geometry: usize) -> bool {
+        self.geometry_colors.get(geometry).is_some_and(|c| c.transparent)
+    }
+
     /// Warnings about settings of the scene that cannot change a pixel: ambient occlusion without
     /// ambient light, colour maps without scalars, textures without coordinates, colours that a
     /// material does not use, attenuation of light from infinitely far. Every render report

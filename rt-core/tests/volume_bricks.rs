@@ -6,8 +6,8 @@ use rt_core::grid::Grid;
 use rt_core::ray::Ray;
 use rt_core::transfer_function::TransferFunction;
 use rt_core::volume::{
-    Brick, Interpolation, PartialIntegral, RaySegments, Volume, VolumeOptions, VolumeQuality,
-    VolumeSample, VolumeShading,
+    Brick, GridExtent, Interpolation, PartialIntegral, RaySegments, Volume, VolumeError,
+    VolumeOptions, VolumeQuality, VolumeSample, VolumeShading,
 };
 
 const DIMS: UVec3 = UVec3::new(41, 37, 29);
@@ -118,4 +118,49 @@ fn rays_through_bricks_have_the_bits_of_rays_through_the_whole() {
         met > 20_000 && through_three > 10_000,
         "{met} rays in the volume, {through_three} through three bricks"
     );
+}
+
+#[test]
+fn a_brick_made_of_its_own_points_is_the_part_of_the_whole() {
+    for interpolation in [Interpolation::Linear, Interpolation::Nearest] {
+        let options = VolumeOptions { interpolation, ..VolumeOptions::default() };
+        let whole = volume(options.clone());
+        let extent = GridExtent { dims: DIMS, origin: whole.origin(), spacing: SPACING };
+        let nearest = interpolation == Interpolation::Nearest;
+        assert_eq!(extent.blocks(nearest), whole.blocks());
+        for brick in bricks(whole.blocks()) {
+            let part = whole.part(brick);
+            let [low, high] = brick.points(DIMS, nearest);
+            let mut values = Vec::new();
+            for k in low.z..high.z {
+                for j in low.y..high.y {
+                    values.extend((low.x..high.x).map(|i| whole.grid().at(i, j, k)));
+                }
+            }
+            let of_points = |values: Vec<f32>| {
+                let transfer = whole.transfer_function().clone();
+                Volume::from_brick(extent, brick, values, transfer, options.clone())
+            };
+            let made = of_points(values.clone()).unwrap();
+            let numbers = |v: &Volume| -> Vec<u32> {
+                v.grid().values().iter().map(|x| x.to_bits()).collect()
+            };
+            assert_eq!(numbers(&made), numbers(&part), "{brick:?}");
+            assert_eq!((made.report(), made.bounds()), (part.report(), part.bounds()));
+            assert_eq!(made.grid().origin(), part.grid().origin());
+            let all = Brick { first: UVec3::ZERO, end: whole.blocks() };
+            for z in 0..all.end.z {
+                for y in 0..all.end.y {
+                    for x in 0..all.end.x {
+                        let block = UVec3::new(x, y, z);
+                        let expected = brick.contains(block) && whole.is_occupied(block);
+                        assert_eq!(made.is_occupied(block), expected, "{block}");
+                        assert_eq!(part.is_occupied(block), expected, "{block}");
+                    }
+                }
+            }
+            values.pop();
+            assert!(matches!(of_points(values), Err(VolumeError::Brick(_))), "one is missing");
+        }
+    }
 }

@@ -44,9 +44,7 @@ pub(super) fn demo(
     }
     // Before anything is rendered, so that a folder that cannot be made is reported now.
     if !args.ranks.is_rank() {
-        std::fs::create_dir_all(&args.out)
-            .with_context(|| format!("cannot make the folder {}", args.out.display()))
-            .cure("name another in --out")?;
+        args.output_files().cure("name another in --out or --output")?;
     }
     let Some(scene) = args.scene else {
         return demo_data::demo(common, args, arguments);
@@ -56,9 +54,7 @@ pub(super) fn demo(
         arguments,
         |comm| frames(comm, args, scene),
         |(transport, frame_secs, colors, lines): FinishedDemo| {
-            std::fs::create_dir_all(&args.out).with_context(|| args.out.display().to_string())?;
-            let (picture, plot) =
-                (args.out.join("composite_demo.png"), args.out.join("composite_demo.svg"));
+            let [picture, plot] = args.output_files()?;
             write_image(&picture, args.size, &colors)?;
             let title = format!(
                 "{} ranks over {transport}, {}x{} {}: {:.2} ms",

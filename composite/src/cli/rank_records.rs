@@ -1,5 +1,5 @@
 //! What one rank did in the frame of a demo, as sent to rank 0 and written to JSON.
-use crate::render::{Activity, RankReport, Span};
+use crate::render::{Activity, Part, RankReport, Span};
 use crate::report::Report;
 use serde::{Deserialize, Serialize};
 
@@ -68,6 +68,10 @@ impl RankTimes {
 pub(super) struct RankRecord {
     pub(super) rank: usize,
     pub(super) triangles: usize,
+    /// Values of volumes.
+    pub(super) values: usize,
+    /// Files that it has read by itself.
+    pub(super) files: usize,
     /// Milliseconds by activity, in the order of [`Activity::ALL`].
     pub(super) render_ms: f64,
     pub(super) composite_ms: f64,
@@ -78,14 +82,17 @@ pub(super) struct RankRecord {
     pub(super) total_ms: f64,
     pub(super) camera_rays: u64,
     pub(super) answered_rays: u64,
+    /// Rays, and points whose light was asked for, that went to other ranks.
+    pub(super) rays_sent: u64,
     pub(super) rounds: u32,
     pub(super) bytes_sent: u64,
+    pub(super) bytes_received: u64,
     /// Activity (index in [`Activity::ALL`]), beginning and end in milliseconds.
     pub(super) spans: Vec<(usize, f64, f64)>,
 }
 
 impl RankRecord {
-    pub(super) fn new(rank: usize, triangles: usize, report: &RankReport) -> Self {
+    pub(super) fn new(rank: usize, files: usize, part: &Part, report: &RankReport) -> Self {
         let ms = |activity| 1e3 * report.secs(activity);
         let span = |s: &Span| {
             let place = Activity::ALL.iter().position(|a| *a == s.activity).unwrap_or(0);
@@ -93,7 +100,9 @@ impl RankRecord {
         };
         Self {
             rank,
-            triangles,
+            triangles: part.primitives(),
+            values: part.volume_values(),
+            files,
             render_ms: ms(Activity::Render),
             composite_ms: ms(Activity::Composite),
             shade_ms: ms(Activity::Shade),
@@ -103,8 +112,10 @@ impl RankRecord {
             total_ms: 1e3 * report.total_secs(),
             camera_rays: report.camera_rays,
             answered_rays: report.answered_rays,
+            rays_sent: report.rays_sent + report.points_sent,
             rounds: report.rounds,
             bytes_sent: report.bytes_sent,
+            bytes_received: report.bytes_received,
             spans: report.spans.iter().map(span).collect(),
         }
     }

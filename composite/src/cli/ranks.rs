@@ -6,6 +6,7 @@ use crate::error::CompositeError;
 use datasets::cli::{CommonArgs, Status, UsageError};
 use std::ffi::OsString;
 use std::io::Write as _;
+use std::num::NonZeroU32;
 use std::time::Duration;
 
 /// The largest job: more threads or processes on one machine measure nothing.
@@ -13,6 +14,9 @@ const MOST_RANKS: usize = 4096;
 
 /// The network of `--model`, which is that of `--smpi`.
 const MODEL: sim::Network = sim::Network::QDR_AS_SMPI;
+
+/// Groups that are made and dropped before the one that works.
+const GROUPS_BEFORE: usize = 5;
 
 /// What every job takes.
 #[derive(Debug, clap::Args)]
@@ -24,7 +28,7 @@ pub(super) struct RankArgs {
     /// Ranks are threads of this process (the default)
     #[arg(long, group = "where")]
     threads: bool,
-    /// Ranks are processes of an MPI job; mpirun is started unless this already is a rank
+    /// Ranks are processes of an MPI job; mpirun is started unless a launcher has started this
     #[arg(long, group = "where")]
     mpi: bool,
     /// Ranks are simulated by SimGrid on a network of 4X QDR InfiniBand
@@ -40,6 +44,10 @@ pub(super) struct RankArgs {
     /// Cut messages over MPI into chunks of this many bytes, as those of more than 64 MiB are
     #[arg(long, hide = true, default_value_t = 1 << 26)]
     chunk_bytes: usize,
+    /// Split the ranks of an MPI job into this many groups, which all do the same at once, each
+    /// with a communicator of its own; the first group reports
+    #[arg(long, hide = true, default_value_t = NonZeroU32::MIN)]
+    groups: NonZeroU32,
     /// All ranks but the last wait this many milliseconds after each collective in shared memory,
     /// on a busy machine
     #[arg(long, hide = true, default_value_t = 0)]
@@ -124,14 +132,16 @@ impl RankArgs {
         &self.ranks
     }
 
-    /// Whether this process is one of the ranks already.
+    /// Whether this process is one of the ranks already: a launcher of MPI has started it, and
+    /// nothing else is asked for.
     pub(super) fn is_rank(&self) -> bool {
-        smpirun::inside() || (self.mpi && launcher::launched(launcher::variable))
+        let elsewhere = self.threads || self.smpi || self.model;
+        smpirun::inside() || (!elsewhere && launcher::launched(launcher::variable))
     }
 
     /// Whether ranks are threads of this process that all run at once.
     pub(super) fn are_threads(&self) -> bool {
-        !(self.mpi || self.smpi || self.model || smpirun::inside())
+        !(self.mpi || self.smpi || self.model || self.is_rank())
     }
 
     pub(super) fn count(&self) -> Result<usize, UsageError> {
@@ -216,41 +226,55 @@ impl RankArgs {
         work: impl Fn(&mut RankComm) -> anyhow::Result<T>,
         finish: impl FnOnce(T) -> anyhow::Result<Status>,
     ) -> anyhow::Result<Status> {
-        let mut comm = Box::new(MpiComm::with_chunks(self.chunk_bytes)?);
+        let world = MpiComm::with_chunks(self.chunk_bytes)?;
+        if let Some(wanted) = self.ranks.first().copied().filter(|n| *n != world.size()) {
+            let size = world.size();
+            return end_with(
+                RankComm::Mpi(Box::new(world)),
+                UsageError(format!(
+                    "--ranks {wanted}, but the launcher has started {size}: leave --ranks out, or \
+                     start {wanted}"
+                ))
+                .into(),
+            );
+        }
+        let color = world.rank() as u32 % self.groups;
+        let first_group = color == 0;
+        // The job's communicator is kept: it was made first, and ends MPI last.
+        let (mut comm, _world) = if self.groups.get() == 1 {
+            (Box::new(world), None)
+        } else {
+            let group = || world.split(color, 0);
+            // Groups that came and went leave nothing behind.
+            for _ in 0..GROUPS_BEFORE {
+                group()?;
+            }
+            (Box::new(group()?), Some(world))
+        };
         #[cfg(target_os = "linux")]
         if comm.rank() + 1 < comm.size() {
             comm.delay_after_collectives(Duration::from_millis(self.linger_ms));
         }
         let mut comm = RankComm::Mpi(comm);
-        let size = comm.comm().size();
-        let result = match self.ranks.first().copied() {
-            Some(wanted) if wanted != size => Err(anyhow::Error::new(UsageError(format!(
-                "--ranks {wanted}, but the launcher has started {size}: leave --ranks out, or \
-                 start {wanted}"
-            )))),
-            _ => work(&mut comm),
-        };
-        match result {
-            Ok(value) => {
-                if comm.comm().rank() == 0 {
-                    finish(value)
-                } else {
-                    Ok(Status::Success)
-                }
-            }
-            Err(error) => {
-                // In one write: all ranks write here, and separate writes would be interleaved.
-                let line = format!("error: {}: {error:#}\n", comm.location());
-                let _ = std::io::stderr().write_all(line.as_bytes());
-                comm.comm().abort(&format!("{error:#}"));
-                let status = if error.is::<UsageError>() { Status::Usage } else { Status::Failure };
-                if let RankComm::Mpi(comm) = comm {
-                    comm.end_job(status as i32);
-                }
-                Ok(status)
-            }
+        match work(&mut comm) {
+            Ok(value) if first_group && comm.comm().rank() == 0 => finish(value),
+            Ok(_) => Ok(Status::Success),
+            Err(error) => end_with(comm, error),
         }
     }
+}
+
+/// Reports the error of a rank of an MPI job, and ends the job.
+fn end_with(mut comm: RankComm, error: anyhow::Error) -> anyhow::Result<Status> {
+    // In one write: all ranks write here, and separate writes would be interleaved.
+    let line = format!("error: {}: {error:#}\n", comm.location());
+    let _ = std::io::stderr().write_all(line.as_bytes());
+    comm.comm().abort(&format!("{error:#}"));
+    let status = if error.is::<UsageError>() { Status::Usage } else { Status::Failure };
+    if let RankComm::Mpi(comm) = comm {
+        comm.end_job(status as i32);
+    }
+    Ok(status)
 }
 
 /// Whether an error only says that another rank has one.

@@ -40,13 +40,18 @@ pub(super) fn svg(title: &str, lines: &[RankRecord]) -> String {
 
 /// A line for each rank, milliseconds.
 pub(super) fn table(lines: &[RankRecord]) -> String {
-    let mut text = format!("{:>5} {:>10}", "rank", "triangles");
+    let values = lines.iter().any(|l| l.values > 0);
+    let mut text = format!("{:>5} {:>10}", "rank", if values { "values" } else { "triangles" });
     for activity in Activity::ALL {
         let _ = write!(text, " {:>9}", activity.name());
     }
-    let _ = write!(text, " {:>9} {:>7} {:>12}", "total ms", "rounds", "bytes sent");
+    let _ = write!(
+        text,
+        " {:>9} {:>7} {:>11} {:>11} {:>12} {:>14}",
+        "total ms", "rounds", "camera rays", "rays sent", "bytes sent", "bytes received"
+    );
     for l in lines {
-        let _ = write!(text, "\n{:>5} {:>10}", l.rank, l.triangles);
+        let _ = write!(text, "\n{:>5} {:>10}", l.rank, if values { l.values } else { l.triangles });
         let columns = [
             l.render_ms,
             l.composite_ms,
@@ -59,7 +64,11 @@ pub(super) fn table(lines: &[RankRecord]) -> String {
         for ms in columns {
             let _ = write!(text, " {ms:>9.2}");
         }
-        let _ = write!(text, " {:>7} {:>12}", l.rounds, l.bytes_sent);
+        let _ = write!(
+            text,
+            " {:>7} {:>11} {:>11} {:>12} {:>14}",
+            l.rounds, l.camera_rays, l.rays_sent, l.bytes_sent, l.bytes_received
+        );
     }
     text
 }

@@ -4,8 +4,9 @@ use super::demo_model::{DemoModel, DemoShape, middle_and_radius};
 use super::{DataParallel, FrameError, FrameOptions, FrameOutput, Partition, Split};
 use crate::comm::Communicator;
 use datasets::catalogue;
+use datasets::view::View;
 use rt_core::bvh::BuildOptions;
-use rt_core::camera::Camera;
+use rt_core::camera::{Camera, CameraError};
 use rt_core::environment::Background;
 use rt_core::glam::DVec3;
 use rt_core::light::Light as Lamp;
@@ -86,10 +87,7 @@ impl Demo {
         };
         let partition = Partition::new(&scene, ranks, &split);
         let scene = if self.color_by_rank { colored(&scene, &partition) } else { scene };
-        let options = RenderOptions {
-            samples: self.samples,
-            ..RenderOptions::new(self.size_px[0], self.size_px[1])
-        };
+        let options = self.render_options();
         Ok(PreparedDemo { scene, camera, options, partition })
     }
 
@@ -124,33 +122,52 @@ impl Demo {
         for body in bodies {
             body.add_to(&mut builder, Material::matte([0.8; 3]));
         }
-        if self.global_light {
-            let forward = (view.target - view.eye).normalize_or_zero();
-            let right = forward.cross(view.up).normalize_or_zero();
-            let above: DVec3 = view.up.normalize_or_zero();
-            let lamp = middle + (above * 1.5 - right * 0.8 - forward * 1.2) * 2.0 * radius;
-            builder.light(Lamp::point(lamp).with_color([0.75; 3]));
-            builder.light(Lamp::ambient([0.35; 3]));
-        } else {
-            builder.light(Lamp::headlight());
-        }
+        let (lights, ambient_occlusion) = self.light(view, middle, radius);
+        lights.into_iter().for_each(|lamp| builder.light(lamp));
         let mut scene = builder.build()?;
         scene.background = Background::Constant([1.0; 4]);
-        if self.global_light {
-            scene.ambient_occlusion = Some(AmbientOcclusion { distance: 0.15 * radius, rays: 16 });
+        scene.ambient_occlusion = ambient_occlusion;
+        Ok((scene, self.camera(view, middle, radius)?))
+    }
+
+    /// The lights of everything within `radius` of `middle`.
+    pub(super) fn light(
+        &self,
+        view: &View,
+        middle: DVec3,
+        radius: f64,
+    ) -> (Vec<Lamp>, Option<AmbientOcclusion>) {
+        if !self.global_light {
+            return (vec![Lamp::headlight()], None);
         }
+        let forward = (view.target - view.eye).normalize_or_zero();
+        let right = forward.cross(view.up).normalize_or_zero();
+        let above: DVec3 = view.up.normalize_or_zero();
+        let lamp = middle + (above * 1.5 - right * 0.8 - forward * 1.2) * 2.0 * radius;
+        let lights = vec![Lamp::point(lamp).with_color([0.75; 3]), Lamp::ambient([0.35; 3])];
+        (lights, Some(AmbientOcclusion { distance: 0.15 * radius, rays: 16 }))
+    }
+
+    /// The camera that sees everything within `radius` of `middle`.
+    pub(super) fn camera(
+        &self,
+        view: &View,
+        middle: DVec3,
+        radius: f64,
+    ) -> Result<Camera, CameraError> {
         let reach = (view.eye - middle).length() + 2.0 * radius;
         let aspect = f64::from(self.size_px[0]) / f64::from(self.size_px[1].max(1));
         let fov_rad = view.vertical_fov_degrees.to_radians();
-        let camera = Camera::perspective(
-            view.eye,
-            view.target,
-            view.up,
-            fov_rad,
-            aspect,
-            [1e-3 * reach, reach],
-        )?;
-        Ok((scene, camera))
+        let limits = [1e-3 * reach, reach];
+        Camera::perspective(view.eye, view.target, view.up, fov_rad, aspect, limits)
+    }
+
+    /// The frame.
+    pub(super) fn render_options(&self) -> RenderOptions {
+        RenderOptions {
+            samples: self.samples,
+            ..RenderOptions::new(self.size_px[0], self.size_px[1])
+        }
     }
 }
 

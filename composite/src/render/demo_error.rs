@@ -36,6 +36,20 @@ pub enum DemoError {
         /// The file.
         file: String,
     },
+    /// A list of files without a file.
+    #[error("{file} names no pieces")]
+    NoPieces {
+        /// The file.
+        file: String,
+    },
+    /// A list of files shows the whole, in one way.
+    #[error("{file} is a list of pieces, which has no {what}: leave it out")]
+    OptionOfPieces {
+        /// The file.
+        file: String,
+        /// "size", "view", ...
+        what: &'static str,
+    },
     /// A name that looks like a file, but there is no such file.
     #[error("there is no file {file}, and {unknown}")]
     NoFile {

@@ -95,6 +95,11 @@ pub(super) fn middle_and_radius(bodies: &[DemoShape]) -> (DVec3, f64) {
     for [lo, hi] in bodies.iter().map(DemoShape::bounds) {
         (low, high) = (low.min(lo), high.max(hi));
     }
+    middle_and_radius_of([low, high])
+}
+
+/// The same for a box.
+pub(super) fn middle_and_radius_of([low, high]: [DVec3; 2]) -> (DVec3, f64) {
     if low.is_finite() && high.is_finite() {
         let radius = 0.5 * (high - low).length();
         // The view of a single point is that of a ball around it.
@@ -105,7 +110,7 @@ pub(super) fn middle_and_radius(bodies: &[DemoShape]) -> (DVec3, f64) {
 }
 
 /// A view of everything, from a little above.
-fn whole((middle, radius): (DVec3, f64)) -> View {
+pub(super) fn whole((middle, radius): (DVec3, f64)) -> View {
     let from = DVec3::new(0.5, -1.0, 0.5).normalize();
     View::new("whole", middle + from * radius.max(f64::MIN_POSITIVE) * 4.0, middle)
 }

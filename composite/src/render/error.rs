@@ -64,6 +64,28 @@ pub enum FrameError {
         /// Ranks of the communicator.
         ranks: usize,
     },
+    /// Ranks give different values for what must be the same on all. Every rank gets this error,
+    /// and the communicator can still be used.
+    #[error(
+        "the ranks contradict each other: {what}: {field}: {values}; give the same on all ranks"
+    )]
+    Contradiction {
+        /// "lights", "camera", "object `wing`", ...
+        what: String,
+        /// The first field in which they differ.
+        field: String,
+        /// The values, each with its ranks.
+        values: String,
+    },
+    /// What a rank gives of a distributed scene cannot be used. Every rank gets this error, and the
+    /// communicator can still be used.
+    #[error("rank {rank} gives what cannot be rendered: {reason}")]
+    RankScene {
+        /// Which one.
+        rank: usize,
+        /// What is wrong, and the cure.
+        reason: String,
+    },
     /// A volume cannot be distributed like that.
     #[error("volume {volume} cannot be dealt so: {reason}")]
     Holders {
@@ -72,4 +94,11 @@ pub enum FrameError {
         /// What is wrong.
         reason: String,
     },
+}
+
+impl FrameError {
+    /// Whether every rank has this same error, so that no rank waits for another.
+    pub(super) fn is_agreed(&self) -> bool {
+        matches!(self, FrameError::Contradiction { .. } | FrameError::RankScene { .. })
+    }
 }

@@ -42,6 +42,8 @@
 pub mod demo;
 mod demo_error;
 mod demo_model;
+mod demo_pieces;
+mod distributed;
 mod error;
 pub mod ghost;
 mod options;
@@ -62,6 +64,8 @@ mod volume_bricks;
 mod volumes;
 mod wire_format;
 
+pub use demo_pieces::{PieceDemo, PiecesOfRank};
+pub use distributed::{DistributedVolume, PointBrick, RankScene};
 pub use error::FrameError;
 pub use options::{FrameOptions, FrameOutput, SecondaryRayPolicy};
 pub use partition::{Part, Partition, Split};

@@ -52,8 +52,8 @@ pub struct Part {
     pub rank: usize,
     /// Number of parts.
     pub parts: usize,
-    /// By geometry, the numbers of this part's primitives in the whole scene.
-    pub(super) primitive_ids: Vec<Vec<u32>>,
+    /// The numbers of this part's primitives in the whole scene.
+    pub(super) primitive_ids: PrimitiveIds,
     /// The effects that the whole scene needs.
     pub(super) needed: Effects,
     /// Who holds which bricks of volumes.
@@ -64,10 +64,32 @@ pub struct Part {
     pub(super) ghost_layer: Option<(f64, Scene)>,
 }
 
+/// The numbers of a part's primitives in the whole scene, by geometry.
+#[derive(Clone)]
+pub(super) enum PrimitiveIds {
+    /// Any numbers, ascending.
+    Lists(Vec<Vec<u32>>),
+    /// A first number, and how many follow each other from there.
+    Ranges(Vec<(u32, u32)>),
+}
+
+impl PrimitiveIds {
+    /// The number of the part's primitive `primitive` of geometry `geometry`.
+    pub(super) fn of(&self, geometry: usize, primitive: u32) -> u32 {
+        match self {
+            PrimitiveIds::Lists(lists) => lists[geometry][primitive as usize],
+            PrimitiveIds::Ranges(ranges) => ranges[geometry].0 + primitive,
+        }
+    }
+}
+
 impl Part {
     /// Number of primitives in this part.
     pub fn primitives(&self) -> usize {
-        self.primitive_ids.iter().map(Vec::len).sum()
+        match &self.primitive_ids {
+            PrimitiveIds::Lists(lists) => lists.iter().map(Vec::len).sum(),
+            PrimitiveIds::Ranges(ranges) => ranges.iter().map(|r| r.1 as usize).sum(),
+        }
     }
 
     /// Number of grid values of volumes in this part, including the layers around bricks.
@@ -179,7 +201,7 @@ impl Partition {
             scene: part,
             rank,
             parts,
-            primitive_ids,
+            primitive_ids: PrimitiveIds::Lists(primitive_ids),
             needed,
             volume_bricks,
             brick_data,

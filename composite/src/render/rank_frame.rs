@@ -26,7 +26,7 @@ impl RankFrame<'_> {
     /// The number of this part's primitive in the whole scene.
     pub(super) fn global_primitive(&self, instance: u32, primitive: u32) -> u32 {
         let geometry = self.part.scene.world.instances()[instance as usize].geometry;
-        self.part.primitive_ids[geometry][primitive as usize]
+        self.part.primitive_ids.of(geometry, primitive)
     }
 }
 

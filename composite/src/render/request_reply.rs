@@ -9,6 +9,11 @@ use std::time::Duration;
 /// How often a rank that works on other threads checks their progress.
 const LOOK: Duration = Duration::from_millis(20);
 
+/// Most words that a rank may give to all ranks: 16 MiB.
+const MOST_GATHERED: usize = 1 << 22;
+/// Longest description of a problem, bytes.
+const LONGEST_PROBLEM: usize = 2000;
+
 /// Calls a function when it is dropped.
 struct CallOnDrop<F: FnMut()>(F);
 
@@ -215,6 +220,57 @@ impl<'a> RankChannel<'a> {
             );
         }
         Ok(out)
+    }
+
+    /// Gathers numbers of which ranks may have different counts.
+    ///
+    /// # Errors
+    /// [`FrameError::Announced`] for a count above [`MOST_GATHERED`].
+    pub(super) fn all_gather_varying(&mut self, mine: &[u32]) -> Result<Vec<Vec<u32>>, FrameError> {
+        let counts = self.all_gather(&[u32::try_from(mine.len()).unwrap_or(u32::MAX)])?;
+        let longest = counts.iter().map(|count| count[0] as usize).max().unwrap_or(0);
+        if let Some(from) = counts.iter().position(|count| count[0] as usize > MOST_GATHERED) {
+            let reason =
+                format!("{} numbers for all ranks; {MOST_GATHERED} are the most", counts[from][0]);
+            return Err(self.announced_error(from, reason));
+        }
+        let message = encode_message(mine, Vec::new());
+        self.report.bytes_sent += (message.len() * self.size().saturating_sub(1)) as u64;
+        let all = self.comm.all_gather(&message, message_bytes(longest), self.timeout)?;
+        let mut out = Vec::with_capacity(all.len());
+        for (from, (message, count)) in all.iter().zip(&counts).enumerate() {
+            let words = decode_message(message).filter(|w| w.len() == count[0] as usize);
+            out.push(
+                words.ok_or_else(|| {
+                    self.message_error(from, "numbers for all", message.len() / 4)
+                })?,
+            );
+        }
+        Ok(out)
+    }
+
+    /// Returns the first rank's problem on all ranks.
+    ///
+    /// # Errors
+    /// [`FrameError::RankScene`], or those of the transport.
+    pub(super) fn agree_on_success(&mut self, own: Result<(), String>) -> Result<(), FrameError> {
+        let own = own.err().unwrap_or_default();
+        if self.size() == 1 {
+            let rank = 0;
+            return if own.is_empty() {
+                Ok(())
+            } else {
+                Err(FrameError::RankScene { rank, reason: own })
+            };
+        }
+        let bytes: Vec<u32> = own.bytes().take(LONGEST_PROBLEM).map(u32::from).collect();
+        let all = self.all_gather_varying(&bytes)?;
+        let Some(rank) = all.iter().position(|problem| !problem.is_empty()) else {
+            return Ok(());
+        };
+        let bytes: Vec<u8> = all[rank].iter().map(|b| *b as u8).collect();
+        let reason = String::from_utf8_lossy(&bytes).into_owned();
+        Err(FrameError::RankScene { rank, reason })
     }
 
     /// Sends `requests[r]` to each rank r (nothing where it is empty) and answers the requests of

@@ -5,8 +5,11 @@ use super::rank_frame::{RankFrame, each};
 use super::request_reply::RankChannel;
 use super::tile_collector::TileCollector;
 use super::tile_owners::TileOwners;
-use super::{Activity, FrameError, Part, ghost, primary_rays, secondary_rays};
+use super::{
+    Activity, FrameError, Part, RankScene, distributed, ghost, primary_rays, secondary_rays,
+};
 use crate::comm::Communicator;
+use rt_core::bvh::World;
 use rt_core::camera::Camera;
 use rt_core::deferred::{DeferredFrame, Pass, TileState};
 use rt_core::effects::Effects;
@@ -14,6 +17,7 @@ use rt_core::frame::Frame;
 use rt_core::glam::Vec3;
 use rt_core::math::Aabb;
 use rt_core::render::RenderOptions;
+use std::sync::Arc;
 
 /// One rank of a group that renders a scene in parts.
 pub struct DataParallel {
@@ -59,6 +63,56 @@ impl DataParallel {
         Ok(DataParallel { part, options, rank_bounds, decision: None })
     }
 
+    /// One rank of a group that renders the sum of what its ranks have: nobody needs the whole. All
+    /// ranks must call it, each with its own [`RankScene`]. Their parts may overlap in space.
+    ///
+    /// # Errors
+    /// [`FrameError::Contradiction`] and [`FrameError::RankScene`] on every rank, when ranks give
+    /// different settings or one gives something unusable: the communicator can still be used then.
+    /// Otherwise errors of messages and of the transport, after which it cannot.
+    pub fn distributed(
+        comm: &mut dyn Communicator,
+        scene: RankScene,
+        options: FrameOptions,
+    ) -> Result<DataParallel, FrameError> {
+        DataParallel::agreed(comm, scene, options, None)
+    }
+
+    fn agreed(
+        comm: &mut dyn Communicator,
+        scene: RankScene,
+        options: FrameOptions,
+        previous: Option<&World>,
+    ) -> Result<DataParallel, FrameError> {
+        let mut channel = RankChannel::new(comm, options.timeout);
+        let part = distributed::assemble(&mut channel, scene, previous);
+        if let Err(error) = part.as_ref()
+            && !error.is_agreed()
+        {
+            channel.abort(&error.to_string());
+        }
+        DataParallel::new(comm, part?, options)
+    }
+
+    /// Replaces what this rank has, for the next time step. All ranks must call it, also those that
+    /// have the same as before. Trees over geometries that are the same (the same [`Arc`]) are used
+    /// again where their local space has not changed. After an error that leaves the communicator
+    /// usable, the earlier scene can still be rendered.
+    ///
+    /// [`Arc`]: std::sync::Arc
+    ///
+    /// # Errors
+    /// As [`DataParallel::distributed`].
+    pub fn replace(
+        &mut self,
+        comm: &mut dyn Communicator,
+        scene: RankScene,
+    ) -> Result<(), FrameError> {
+        let world = self.part.scene.world.clone();
+        *self = DataParallel::agreed(comm, scene, self.options.clone(), Some(&world))?;
+        Ok(())
+    }
+
     /// The part that this rank holds.
     pub fn part(&self) -> &Part {
         &self.part
@@ -67,7 +121,8 @@ impl DataParallel {
     /// Renders one frame together with all other ranks.
     ///
     /// # Errors
-    /// Any fault on any rank ends the frame for all.
+    /// [`FrameError::Contradiction`] on every rank when ranks have another camera or other options;
+    /// the communicator can still be used then. Any other fault on any rank ends the frame for all.
     pub fn frame(
         &mut self,
         comm: &mut dyn Communicator,
@@ -75,12 +130,44 @@ impl DataParallel {
         options: &RenderOptions,
     ) -> Result<FrameOutput, FrameError> {
         let mut channel = RankChannel::new(comm, self.options.timeout);
-        let result = self.render(&mut channel, camera, options);
-        if let Err(error) = &result {
+        let result = self
+            .agree_on_view(&mut channel, camera, options)
+            .and_then(|()| self.render(&mut channel, camera, options));
+        if let Err(error) = &result
+            && !error.is_agreed()
+        {
             channel.abort(&error.to_string());
         }
         let frame = result?;
         Ok(FrameOutput { frame, report: channel.report })
+    }
+
+    /// Compares what must be the same on all ranks.
+    fn agree_on_view(
+        &self,
+        channel: &mut RankChannel<'_>,
+        camera: &Camera,
+        options: &RenderOptions,
+    ) -> Result<(), FrameError> {
+        // Points, one per pixel, as the digest of their bits. Whether a frame is cancelled is no
+        // setting.
+        let bits = |points: &Option<Arc<Vec<[f64; 2]>>>| {
+            let numbers = points.iter().flat_map(|p| p.as_flattened());
+            numbers.fold(0, |state, n| crate::codec::mix(state, n.to_bits()))
+        };
+        let points = [bits(&options.points), bits(&options.shading_points)];
+        let render =
+            RenderOptions { points: None, shading_points: None, cancel: None, ..options.clone() };
+        let FrameOptions { root, secondary_rays, stream, .. } = &self.options;
+        let settings: [distributed::Setting<'_>; 6] = [
+            ("camera", camera),
+            ("render options", &render),
+            ("points of the image", &points),
+            ("root of the frame", root),
+            ("secondary rays", secondary_rays),
+            ("streaming", stream),
+        ];
+        distributed::agree_on(channel, &settings)
     }
 
     fn render(

@@ -20,6 +20,43 @@ pub(super) struct VolumeBrick {
     pub(super) volume: usize,
     pub(super) brick: Brick,
     pub(super) holders: Vec<u16>,
+    /// Where it has extinction, if the blocks of the whole are nowhere listed.
+    pub(super) occupied: Option<CoarseOccupancy>,
+}
+
+/// Whether parts of a brick have any extinction: a bit for each of 8 x 8 x 8 parts, x fastest.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct CoarseOccupancy(pub(super) [u32; CoarseOccupancy::WORDS]);
+
+impl CoarseOccupancy {
+    pub(super) const WORDS: usize = 16;
+    const PARTS: u32 = 8;
+
+    /// That of `brick` of a volume that holds it; nothing without one.
+    pub(super) fn of(volume: Option<&Volume>, brick: Brick) -> CoarseOccupancy {
+        let mut bits = [0; CoarseOccupancy::WORDS];
+        if let Some(volume) = volume {
+            for block in blocks_of(brick).filter(|block| volume.is_occupied(*block)) {
+                let (word, bit) = CoarseOccupancy::place(brick, block);
+                bits[word] |= 1 << bit;
+            }
+        }
+        CoarseOccupancy(bits)
+    }
+
+    /// Whether the part of `brick` around `block`, which is in the brick, has any extinction.
+    fn has(&self, brick: Brick, block: UVec3) -> bool {
+        let (word, bit) = CoarseOccupancy::place(brick, block);
+        self.0[word] >> bit & 1 != 0
+    }
+
+    fn place(brick: Brick, block: UVec3) -> (usize, u32) {
+        let (at, size) =
+            ((block - brick.first).as_u64vec3(), (brick.end - brick.first).as_u64vec3());
+        let part = (at * u64::from(CoarseOccupancy::PARTS) / size).as_uvec3();
+        let k = (part.z * CoarseOccupancy::PARTS + part.y) * CoarseOccupancy::PARTS + part.x;
+        (k as usize / 32, k % 32)
+    }
 }
 
 /// All bricks of all volumes that are media. Projections need whole volumes, so every rank holds
@@ -27,7 +64,8 @@ pub(super) struct VolumeBrick {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct VolumeBricks {
     pub(super) all: Vec<VolumeBrick>,
-    /// By volume, whether a block has any extinction, x fastest.
+    /// By volume, whether a block has any extinction, x fastest. Empty where nobody has the whole:
+    /// then the bricks know it, coarsely.
     occupied: Vec<Vec<bool>>,
     /// By volume, its blocks per axis.
     blocks: Vec<UVec3>,
@@ -65,11 +103,40 @@ impl VolumeBricks {
             volume,
             brick,
             holders: holders.clone(),
+            occupied: None,
         };
         self.all.extend(bricks.into_iter().zip(holders).map(volume_brick));
     }
 
+    /// Bricks of volumes that no rank has whole. `scene` has placeholders for them.
+    pub(super) fn of_bricks(scene: &Scene, all: Vec<VolumeBrick>) -> VolumeBricks {
+        let blocks = scene.volumes.iter().map(|placed| placed.volume.blocks()).collect();
+        VolumeBricks { all, occupied: Vec::new(), blocks, finer: finer(scene) }
+    }
+
+    /// The blocks that the holder of a brick needs, by volume: its own, and those of coarser
+    /// volumes around it.
+    pub(super) fn blocks_needed(&self, scene: &Scene, brick: &VolumeBrick) -> Vec<(usize, Brick)> {
+        blocks_needed(scene, &self.finer, brick)
+    }
+
+    /// A block of `volume` that no brick has.
+    pub(super) fn first_uncovered(&self, volume: usize) -> Option<UVec3> {
+        let bricks: Vec<Brick> =
+            self.all.iter().filter(|b| b.volume == volume).map(|b| b.brick).collect();
+        first_outside(Brick { first: UVec3::ZERO, end: self.blocks[volume] }, &bricks)
+    }
+
+    /// Whether a block may have extinction.
     pub(super) fn is_occupied(&self, volume: usize, block: UVec3) -> bool {
+        if self.occupied.is_empty() {
+            let has = |b: &VolumeBrick| {
+                b.volume == volume
+                    && b.brick.contains(block)
+                    && b.occupied.is_none_or(|occupied| occupied.has(b.brick, block))
+            };
+            return self.all.iter().any(has);
+        }
         let blocks = self.blocks[volume];
         self.occupied[volume][((block.z * blocks.y + block.y) * blocks.x + block.x) as usize]
     }
@@ -149,22 +216,21 @@ pub(super) struct BrickData {
 
 impl BrickData {
     fn new(scene: &Scene, finer: &[usize], volume_brick: &VolumeBrick) -> BrickData {
-        let here = &scene.volumes[volume_brick.volume];
-        let [lo, hi] = corners(&here.volume, volume_brick.brick);
-        let mut parts = vec![None; scene.volumes.len()];
-        parts[volume_brick.volume] =
-            Some((volume_brick.brick, Arc::new(here.volume.part(volume_brick.brick))));
-        for (v, other) in scene.volumes.iter().enumerate() {
-            if !other.volume.is_medium() || finer[v] <= finer[volume_brick.volume] {
-                continue;
-            }
-            let there = world_from_object(other).inverse() * world_from_object(here);
-            let brick = blocks_around(&other.volume, there, lo, hi);
-            if !brick.is_empty() {
-                parts[v] = Some((brick, Arc::new(other.volume.part(brick))));
-            }
+        let mut data = BrickData::empty(scene.volumes.len());
+        for (v, brick) in blocks_needed(scene, finer, volume_brick) {
+            data.set(v, brick, scene.volumes[v].volume.part(brick));
         }
-        BrickData { parts }
+        data
+    }
+
+    /// Nothing of any of `volumes` volumes.
+    pub(super) fn empty(volumes: usize) -> BrickData {
+        BrickData { parts: vec![None; volumes] }
+    }
+
+    /// Sets the part of a volume.
+    pub(super) fn set(&mut self, volume: usize, brick: Brick, part: Volume) {
+        self.parts[volume] = Some((brick, Arc::new(part)));
     }
 
     /// The part of a volume in this data.
@@ -180,6 +246,52 @@ impl BrickData {
     pub(super) fn num_values(&self) -> usize {
         self.parts.iter().flatten().map(|(_, part)| part.grid().values().len()).sum()
     }
+}
+
+/// What the holder of a brick needs, by volume.
+fn blocks_needed(
+    scene: &Scene,
+    finer: &[usize],
+    volume_brick: &VolumeBrick,
+) -> Vec<(usize, Brick)> {
+    let here = &scene.volumes[volume_brick.volume];
+    let [lo, hi] = corners(&here.volume, volume_brick.brick);
+    let mut needed = vec![(volume_brick.volume, volume_brick.brick)];
+    for (v, other) in scene.volumes.iter().enumerate() {
+        if !other.volume.is_medium() || finer[v] <= finer[volume_brick.volume] {
+            continue;
+        }
+        let there = world_from_object(other).inverse() * world_from_object(here);
+        let brick = blocks_around(&other.volume, there, lo, hi);
+        if !brick.is_empty() {
+            needed.push((v, brick));
+        }
+    }
+    needed
+}
+
+/// A block of `whole` that is in none of `bricks`.
+fn first_outside(whole: Brick, bricks: &[Brick]) -> Option<UVec3> {
+    if whole.is_empty() {
+        return None;
+    }
+    let shares = |b: &Brick| b.first.cmplt(whole.end).all() && whole.first.cmplt(b.end).all();
+    let Some(k) = bricks.iter().position(|b| !b.is_empty() && shares(b)) else {
+        return Some(whole.first);
+    };
+    // What is left around the shared box, side by side: later bricks cover it, or nothing does.
+    let (b, mut left) = (bricks[k], whole);
+    for axis in 0..3 {
+        let (mut below, mut above) = (left, left);
+        below.end[axis] = b.first[axis].clamp(left.first[axis], left.end[axis]);
+        above.first[axis] = b.end[axis].clamp(left.first[axis], left.end[axis]);
+        (left.first[axis], left.end[axis]) = (below.end[axis], above.first[axis]);
+        let outside = [below, above].into_iter().find_map(|b| first_outside(b, &bricks[k + 1..]));
+        if outside.is_some() {
+            return outside;
+        }
+    }
+    None
 }
 
 /// Transform from the space relative to the volume's origin.
@@ -310,4 +422,40 @@ fn halve(brick: Brick, count: usize, work: &impl Fn(UVec3) -> f64, out: &mut Vec
     (near.end[axis], far.first[axis]) = (cut, cut);
     halve(near, lower, work, out);
     halve(far, count - lower, work, out);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn brick(first: [u32; 3], end: [u32; 3]) -> Brick {
+        Brick { first: UVec3::from_array(first), end: UVec3::from_array(end) }
+    }
+
+    #[test]
+    fn a_hole_between_bricks_is_found_wherever_it_is() {
+        let whole = brick([0; 3], [4; 3]);
+        let mut cells: Vec<Brick> =
+            blocks_of(whole).map(|first| Brick { first, end: first + 1 }).collect();
+        cells.extend([brick([0; 3], [2; 3]), Brick::EMPTY]);
+        assert_eq!(first_outside(whole, &cells), None);
+        for k in 0..64 {
+            let others = (0..64).filter(|i| *i != k);
+            let left: Vec<Brick> = others.map(|i| cells[i]).collect();
+            assert_eq!(first_outside(whole, &left), Some(cells[k].first));
+        }
+        assert_eq!(first_outside(whole, &[]), Some(UVec3::ZERO));
+    }
+
+    #[test]
+    fn parts_of_a_brick_of_any_size_have_their_own_bits() {
+        let brick = brick([3, 0, 9], [20, 1, 12]);
+        let places: Vec<_> = blocks_of(brick).map(|b| CoarseOccupancy::place(brick, b)).collect();
+        assert!(places.iter().all(|(word, _)| *word < CoarseOccupancy::WORDS));
+        let first = blocks_of(brick).next().unwrap();
+        assert_eq!(CoarseOccupancy::place(brick, first), (0, 0));
+        let mut some = CoarseOccupancy([0; CoarseOccupancy::WORDS]);
+        some.0[0] = 1;
+        assert!(some.has(brick, first) && !some.has(brick, UVec3::new(19, 0, 11)));
+    }
 }

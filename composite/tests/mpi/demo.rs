@@ -134,3 +134,157 @@ fn a_file_rendered_in_parts_by_threads_models_and_mpi_ranks_is_the_image_of_one_
     assert_eq!(triangles(&four), [100; 4]);
     assert!(headlight != alone, "shadows are there");
 }
+
+/// Columns of a wavy sheet of quadrilaterals, as VTK writes them.
+fn vtu_piece(first: usize, cells: usize) -> String {
+    let (mut points, mut ids, mut heights) = (String::new(), String::new(), String::new());
+    for j in 0..=8 {
+        for i in 0..=cells {
+            let (x, y) = ((first + i) as f64, f64::from(j));
+            let z = 1.5 * (0.8 * x).sin() * (0.6 * y).cos();
+            points += &format!("{x} {y} {z} ");
+            heights += &format!("{z} ");
+        }
+    }
+    for j in 0..8 {
+        for i in 0..cells {
+            let k = j * (cells + 1) + i;
+            ids += &format!("{k} {} {} {} ", k + 1, k + cells + 2, k + cells + 1);
+        }
+    }
+    let n = 8 * cells;
+    let ends: String = (1..=n).map(|k| format!("{} ", 4 * k)).collect();
+    format!(
+        r#"<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian">
+        <UnstructuredGrid><Piece NumberOfPoints="{}" NumberOfCells="{n}">
+        <PointData><DataArray type="Float64" Name="height" format="ascii">{heights}</DataArray>
+        </PointData>
+        <Points><DataArray type="Float64" NumberOfComponents="3" format="ascii">{points}</DataArray>
+        </Points><Cells>
+        <DataArray type="Int64" Name="connectivity" format="ascii">{ids}</DataArray>
+        <DataArray type="Int64" Name="offsets" format="ascii">{ends}</DataArray>
+        <DataArray type="UInt8" Name="types" format="ascii">{}</DataArray>
+        </Cells></Piece></UnstructuredGrid></VTKFile>"#,
+        9 * (cells + 1),
+        "9 ".repeat(n)
+    )
+}
+
+/// Layers of a lattice.
+fn vti_piece(first: usize, end: usize) -> String {
+    let mut values = String::new();
+    for k in 0..=12 {
+        for j in 0..=14 {
+            for i in first..=end {
+                let [x, y, z] = [i, j, k].map(|c| 0.45 * c as f64);
+                values += &format!("{} ", x.sin() * y.cos() + z.sin());
+            }
+        }
+    }
+    format!(
+        r#"<VTKFile type="ImageData" version="1.0" byte_order="LittleEndian">
+        <ImageData WholeExtent="0 20 0 14 0 12" Origin="1 0 0" Spacing="0.5 0.5 0.5">
+        <Piece Extent="{first} {end} 0 14 0 12"><PointData>
+        <DataArray type="Float32" Name="rho" format="ascii">{values}</DataArray>
+        </PointData></Piece></ImageData></VTKFile>"#
+    )
+}
+
+#[test]
+fn pieces_that_ranks_read_by_themselves_give_one_picture_over_every_transport() {
+    let folder = std::env::temp_dir().join(format!("composite-pieces-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).expect("a folder");
+    let write = |name: &str, text: &str| {
+        let path = folder.join(name);
+        std::fs::write(&path, text).expect("a file");
+        path.to_str().expect("a path in UTF-8").to_owned()
+    };
+    for k in 0..5 {
+        write(&format!("sheet{k}.vtu"), &vtu_piece(4 * k, 4));
+        write(&format!("rho{k}.vti"), &vti_piece(4 * k, 4 * k + 4));
+    }
+    let list = |kind: &str, ending: &str, more: &str| {
+        let piece = |k: usize| match kind {
+            "ImageData" => format!(
+                r#"<Piece Extent="{} {} 0 14 0 12" Source="rho{k}.vti"/>"#,
+                4 * k,
+                4 * k + 4
+            ),
+            _ => format!(r#"<Piece Source="sheet{k}.vtu"/>"#),
+        };
+        let pieces: String = (0..5).map(piece).collect();
+        write(
+            &format!("all.{ending}"),
+            &format!(
+                r#"<VTKFile type="P{kind}" version="1.0"><P{kind} {more}>{pieces}</P{kind}></VTKFile>"#
+            ),
+        )
+    };
+    let lattice = r#"WholeExtent="0 20 0 14 0 12" Origin="1 0 0" Spacing="0.5 0.5 0.5""#;
+    let blocks: String =
+        (0..5).map(|k| format!(r#"<DataSet index="{k}" file="sheet{k}.vtu"/>"#)).collect();
+    let (pvtu, pvti) = (list("UnstructuredGrid", "pvtu", ""), list("ImageData", "pvti", lattice));
+    let vtm = write(
+        "all.vtm",
+        &format!(
+            "<VTKFile type=\"vtkMultiBlockDataSet\" version=\"1.0\"><vtkMultiBlockDataSet>{blocks}\
+             </vtkMultiBlockDataSet></VTKFile>"
+        ),
+    );
+    let picture = |file: &str, more: &[&str], variables: &[(&str, &Path)]| {
+        let out = folder.join("out.png");
+        let path = out.to_str().expect("a path in UTF-8");
+        let common = ["demo", file, "--size", "120", "--frames", "1", "--json", "-o", path];
+        let ran = run(&[&common, more].concat(), variables);
+        assert_eq!(ran.code, Some(0), "{}", ran.text);
+        let shown: serde_json::Value =
+            serde_json::from_str(ran.stdout.trim()).expect("one line of JSON");
+        assert!(folder.join("out.svg").is_file(), "the plot lies beside the image");
+        (std::fs::read(&out).expect("the image"), shown)
+    };
+    for (file, more) in [
+        (&pvtu, &["--grey"][..]),
+        (&pvtu, &["--array", "height"]),
+        (&vtm, &["--grey"]),
+        (&pvti, &[]),
+        (&pvti, &["--array", "rho", "--headlight"]),
+    ] {
+        let (one, alone) = picture(file, &[&["--threads", "-n", "1"], more].concat(), &[]);
+        assert_eq!(alone["ranks"][0]["files"].as_u64(), Some(5), "{alone}");
+        let (three, shown) = picture(file, &[&["--threads", "-n", "3"], more].concat(), &[]);
+        assert!(one == three, "{file} {more:?}: the images differ");
+        let of_ranks = |key: &str| -> Vec<u64> {
+            let ranks = shown["ranks"].as_array().expect("ranks");
+            ranks.iter().filter_map(|r| r[key].as_u64()).collect()
+        };
+        assert_eq!(of_ranks("files"), [1, 2, 2], "{shown}");
+        assert!(of_ranks("bytes_received").iter().sum::<u64>() > 0, "{shown}");
+        // More ranks than files: some have nothing.
+        let (eight, _) = picture(file, &[&["--threads", "-n", "8"], more].concat(), &[]);
+        assert!(one == eight, "{file} {more:?}: the images differ");
+        for (variable, name) in [("RTSV_MPIRUN", "Open MPI"), ("RTSV_MPIRUN_MPICH", "MPICH")] {
+            let Some(mpirun) = peer(variable) else { continue };
+            let launcher = [("COMPOSITE_MPIRUN", mpirun.as_path())];
+            let (over_mpi, shown) =
+                picture(file, &[&["--mpi", "-n", "3"], more].concat(), &launcher);
+            assert!(shown["transport"].as_str().is_some_and(|t| t.contains(name)), "{shown}");
+            assert!(one == over_mpi, "{file} {more:?} over {name}: the images differ");
+        }
+    }
+    // ---- Errors name the rank and the file.
+    write("sheet4.vtu", "<VTKFile");
+    let ran = run(&["demo", &pvtu, "-n", "3", "--threads", "--size", "40"], &[]);
+    assert!(
+        ran.code == Some(1) && ran.text.contains("rank 2 gives") && ran.text.contains("sheet4.vtu"),
+        "{}",
+        ran.text
+    );
+    for (arguments, words) in [
+        (vec![pvtu.as_str(), "--view", "front"], "has no other view"),
+        (vec![pvtu.as_str(), "--cut-by-view"], "has no cut by view"),
+    ] {
+        let ran = run(&[&["demo"][..], &arguments].concat(), &[]);
+        assert!(ran.code == Some(2) && ran.text.contains(words), "{arguments:?}: {}", ran.text);
+    }
+    std::fs::remove_dir_all(&folder).expect("the folder");
+}

@@ -78,6 +78,23 @@ fn mpich_carries_every_strategy_and_the_hard_cases_to_the_bits_of_the_reference(
 }
 
 #[test]
+fn groups_of_an_mpi_job_work_at_once_on_communicators_of_their_own() {
+    for (variable, transport) in [("RTSV_MPIRUN", "Open MPI"), ("RTSV_MPIRUN_MPICH", "MPICH")] {
+        let Some(mpirun) = peer(variable) else { continue };
+        // Four processes in groups of two, each of which checks everything.
+        let arguments = ["check", "--json", "--mpi", "-n", "4", "--groups", "2"];
+        let ran = run(&arguments, &[("COMPOSITE_MPIRUN", &mpirun)]);
+        assert_eq!(ran.code, Some(0), "{}", ran.text);
+        let checked: serde_json::Value =
+            serde_json::from_str(ran.stdout.trim()).expect("one line of JSON, of the first group");
+        assert_eq!(checked["ranks"].as_u64(), Some(2), "{checked}");
+        assert_eq!(checked["images_differ"].as_u64(), Some(0), "{checked}");
+        assert!(checked["images"].as_u64().is_some_and(|n| n >= 120), "{checked}");
+        assert!(checked["transport"].as_str().is_some_and(|t| t.contains(transport)), "{checked}");
+    }
+}
+
+#[test]
 fn messages_cut_into_chunks_arrive_whole_and_in_order() {
     for (variable, ranks) in [("RTSV_MPIRUN", 3), ("RTSV_MPIRUN_MPICH", 2)] {
         let Some(mpirun) = peer(variable) else { continue };

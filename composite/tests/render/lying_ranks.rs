@@ -2,10 +2,11 @@
 use crate::{frame_options, scenes};
 use composite::comm::{Arrival, Receive};
 use composite::render::{
-    DataParallel, FrameError, FrameOptions, Partition, SecondaryRayPolicy, Split,
+    DataParallel, FrameError, FrameOptions, Partition, RankScene, SecondaryRayPolicy, Split,
 };
 use composite::{CommError, Communicator, threads};
 use rt_core::bvh::BuildOptions;
+use rt_core::glam::DVec3;
 use std::time::Duration;
 
 const RANKS: usize = 3;
@@ -74,7 +75,11 @@ impl<F: Fn(&mut [u32])> Communicator for Lying<F> {
         }
         let mut words: Vec<u32> =
             mine[8..].as_chunks::<4>().0.iter().map(|c| u32::from_le_bytes(*c)).collect();
+        let truth = words.clone();
         (self.lie)(&mut words);
+        if words == truth {
+            return self.inner.all_gather(mine, longest, timeout);
+        }
         let body: Vec<u8> = words.iter().flat_map(|w| w.to_le_bytes()).collect();
         let said = [&checksum(&body).to_le_bytes()[..], &body].concat();
         self.inner.all_gather(&said, longest, timeout)
@@ -124,6 +129,36 @@ fn assert_refused(ends: &[Option<FrameError>], words: &str) {
     for end in ends {
         let text = end.as_ref().expect("nobody gets an image").to_string();
         assert!(text.contains("from rank 1") && text.contains(words), "{words}: {text}");
+    }
+}
+
+#[test]
+fn bounds_that_are_no_numbers_are_refused_by_the_name_of_their_rank() {
+    // One object, so a rank gathers one box of six numbers at a time.
+    const BOX: usize = 6;
+    for lied in [f32::NAN, f32::INFINITY] {
+        let results = threads::run(RANKS, |inner| {
+            let lie = |words: &mut [u32]| {
+                if words.len() == BOX {
+                    words[1] = lied.to_bits();
+                }
+            };
+            let mut comm = Lying { inner, lie };
+            let mut scene = RankScene::new();
+            let matte = scene.material(scenes::matte());
+            scene.mesh("ground", scenes::bumps(DVec3::ZERO, 6), matte);
+            let options =
+                FrameOptions { timeout: Duration::from_secs(5), ..FrameOptions::default() };
+            DataParallel::distributed(&mut comm, scene, options).err()
+        });
+        for result in results {
+            let error = result.expect("no rank panics").expect("bounds that cannot be");
+            let text = error.to_string();
+            assert!(
+                text.contains("from rank 1") && text.contains("the bounds of object 0"),
+                "{text}"
+            );
+        }
     }
 }
 

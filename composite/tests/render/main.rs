@@ -1,4 +1,5 @@
 //! The image of many ranks equals the image of one node, bit for bit.
+mod distributed;
 mod lying_ranks;
 mod scenes;
 mod volumes;

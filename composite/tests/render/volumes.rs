@@ -61,7 +61,7 @@ fn shaded() -> VolumeOptions {
 
 /// Three media: a coarse one, a fine one rotated and stretched across it, and one completely inside
 /// the first.
-fn three() -> Vec<VolumeInstance> {
+pub(crate) fn three() -> Vec<VolumeInstance> {
     let coarse = wave_volume(
         [21, 26, 19],
         DVec3::new(-1.9, -1.7, -0.6),

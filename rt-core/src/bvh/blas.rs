@@ -141,6 +141,26 @@ impl Blas {
         }
     }
 
+    /// This structure as that of a part of a geometry with `given` local space and bounds (`None`
+    /// for a whole geometry): shared where both are the same, copied where the bounds differ.
+    /// `None` in another space, which needs another tree.
+    pub(crate) fn as_part_of(
+        this: &Arc<Blas>,
+        given: Option<(LocalFrame, Aabb)>,
+    ) -> Option<Arc<Blas>> {
+        let whole = given.map(|(_, bounds)| bounds);
+        if given.is_some_and(|(frame, _)| frame != this.frame) || this.is_part() && given.is_none()
+        {
+            return None;
+        }
+        Some(if this.whole == whole {
+            Arc::clone(this)
+        } else {
+            let (content, notes) = (this.content.clone(), this.notes.clone());
+            Arc::new(Blas { content, notes, whole, ..**this })
+        })
+    }
+
     /// The part of a group's tree that holds one mesh. `reach`: local bounds of the mesh that this
     /// is a part of.
     pub(crate) fn member(

@@ -25,6 +25,7 @@ pub enum Geometry {
 }
 
 /// What is known of a mesh without its arrays.
+#[derive(Clone, Copy)]
 pub(super) struct MeshExtent {
     pub(super) origin: DVec3,
     /// Of the finite vertices, relative to the origin.

@@ -17,6 +17,7 @@ pub(crate) mod intersect;
 pub(crate) mod layout;
 mod mesh_group;
 mod options;
+mod part_layout;
 mod partition;
 mod placement;
 mod query;

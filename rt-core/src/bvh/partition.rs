@@ -82,6 +82,22 @@ impl World {
         whole: &GlobalLayout,
         options: &BuildOptions,
     ) -> Result<World, BuildError> {
+        World::build_part_sharing(geometries, instances, whole, options, None)
+    }
+
+    /// As [`World::build_part`], but reuses the tree of every geometry that `previous`, a part of
+    /// an earlier time step, also has (the same [`Arc`](std::sync::Arc)), where the local space of
+    /// the whole has stayed the same.
+    ///
+    /// # Errors
+    /// As [`World::build_part`].
+    pub fn build_part_sharing(
+        geometries: Vec<Geometry>,
+        instances: Vec<Instance>,
+        whole: &GlobalLayout,
+        options: &BuildOptions,
+        previous: Option<&World>,
+    ) -> Result<World, BuildError> {
         if geometries.len() != whole.geometries.len() {
             return Err(BuildError::NotAPart {
                 expected: whole.geometries.len(),
@@ -99,7 +115,7 @@ impl World {
             return Err(BuildError::NotAMember { instance: instance as usize });
         }
         let request = BuildRequest::new(options, &UNWATCHED);
-        BuildRequest { whole: Some(whole), ..request }.build(geometries, instances)
+        BuildRequest { whole: Some(whole), previous, ..request }.build(geometries, instances)
     }
 }
 
@@ -116,5 +132,64 @@ pub(super) fn blas_of(
     match &sources.geometries[index] {
         Geometry::Shape(s) => Blas::for_shape(s.clone(), options, given, progress),
         _ => Blas::for_mesh(sources.triangles(index), options, given, progress),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::TriMesh;
+    use crate::ray::Ray;
+    use crate::test_shapes::sphere;
+    use std::sync::Arc;
+
+    fn at(center: DVec3) -> Arc<TriMesh> {
+        let mut mesh = sphere(2);
+        mesh.positions.iter_mut().for_each(|p| *p += center.as_vec3());
+        Arc::new(mesh)
+    }
+
+    /// The trees of `geometries` in a part of themselves.
+    fn part(geometries: &[Geometry], places: &[DAffine3], previous: Option<&World>) -> World {
+        let instances: Vec<Instance> = places
+            .iter()
+            .enumerate()
+            .map(|(geometry, &world_from_object)| Instance { geometry, world_from_object })
+            .collect();
+        let options = BuildOptions::default();
+        let whole = World::build(geometries.to_vec(), instances.clone(), &options).unwrap();
+        let layout = whole.global_layout();
+        World::build_part_sharing(geometries.to_vec(), instances, &layout, &options, previous)
+            .unwrap()
+    }
+
+    #[test]
+    fn a_part_takes_trees_from_an_earlier_part_in_the_same_space_alone() {
+        let turned = DAffine3::from_rotation_x(0.4);
+        for places in [[turned; 2], [DAffine3::IDENTITY; 2]] {
+            let (still, moved) = (at(DVec3::ZERO), at(DVec3::X * 3.0));
+            let both = |b: Arc<TriMesh>| vec![Geometry::Mesh(still.clone()), Geometry::Mesh(b)];
+            let first = part(&both(moved), &places, None);
+            let step = both(at(DVec3::X * 4.0));
+            let second = part(&step, &places, Some(&first));
+            let fresh = part(&step, &places, None);
+            // Where every mesh has a tree of its own, that of the still one is the same.
+            if places[0] == turned {
+                assert!(Arc::ptr_eq(&first.blas[0], &second.blas[0]));
+                assert!(!Arc::ptr_eq(&first.blas[1], &second.blas[1]));
+            }
+            assert_eq!(second.global_layout(), fresh.global_layout());
+            for k in 0..200 {
+                let x = -1.0 + 0.03 * k as f32;
+                let ray = Ray::new(glam::Vec3::new(x, 0.1, 9.0), glam::Vec3::NEG_Z);
+                assert_eq!(second.closest(&ray), fresh.closest(&ray), "{x}");
+            }
+            // Far away, the local space is another one: nothing can be taken over.
+            let far: Vec<Geometry> = [DVec3::X * 900.0, DVec3::X * 903.0]
+                .map(|center| Geometry::Mesh(at(center)))
+                .to_vec();
+            let third = part(&far, &places, Some(&second));
+            assert_eq!(third.global_layout(), part(&far, &places, None).global_layout());
+        }
     }
 }

@@ -257,9 +257,11 @@ impl World {
         } else {
             choose_members(&self.geometries, &self.instances)
         };
-        let alone: Vec<_> =
-            self.blas.iter().map(|b| b.bvh().is_some().then(|| Arc::clone(b))).collect();
-        let origin = choose_origin(&self.instances, &alone, choice.as_ref());
+        let alone = |g: usize| {
+            let b = &self.blas[g];
+            b.bvh().is_some().then(|| (b.frame, b.bounds()))
+        };
+        let origin = choose_origin(&self.instances, alone, choice.as_ref());
         let keeps_group = match (&self.group, &choice) {
             (Some(group), Some(choice)) => {
                 let members = group.members.iter().map(|m| m.instance);

@@ -4,10 +4,12 @@ use super::blas::Blas;
 use super::build::{LeafCapacity, PrimRef, Progress, build_wide};
 use super::error::BuildError;
 use super::geometry::Instance;
+use super::layout::local_frame::LocalFrame;
 use super::layout::wide::{LeafWriter, Unit, WideBvh};
 use super::mesh_group::{GroupChoice, MeshGroup};
 use super::options::BuildQuality;
 use super::placement::{PLACEMENT_UNITS, Placement};
+use crate::math::Aabb;
 use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -107,28 +109,30 @@ pub(super) fn build_top_level(
 /// The origin of render space: zero, or the centre of the world's bounds when they are more than
 /// four times their size away from zero. A single geometry without rotation gets its own centre, so
 /// that its local space and render space coincide.
+///
+/// `space_of` gives the local space of a geometry and its bounds there; `None` for members of the
+/// group.
 pub(super) fn choose_origin(
     instances: &[Instance],
-    blas: &[Option<Arc<Blas>>],
+    space_of: impl Fn(usize) -> Option<(LocalFrame, Aabb)> + Sync,
     group: Option<&GroupChoice>,
 ) -> DVec3 {
     if let [only] = instances
-        && let Some(blas) = &blas[only.geometry]
+        && let Some((frame, _)) = space_of(only.geometry)
         && only.world_from_object.matrix3 == DMat3::IDENTITY
         && only.world_from_object.is_finite()
     {
-        return blas.frame.center + only.world_from_object.translation;
+        return frame.center + only.world_from_object.translation;
     }
     let join = |(lo, hi): (DVec3, DVec3), (a, b): (DVec3, DVec3)| (lo.min(a), hi.max(b));
     let nothing = || (DVec3::INFINITY, DVec3::NEG_INFINITY);
     let of_instance = |inst: &Instance| {
-        let Some(b) = &blas[inst.geometry] else { return nothing() };
-        let bounds = b.bounds();
+        let Some((frame, bounds)) = space_of(inst.geometry) else { return nothing() };
         if bounds.is_empty() {
             return nothing();
         }
         let of_corner = |c: Vec3| {
-            let object = c.as_dvec3() / b.frame.scale + b.frame.center;
+            let object = c.as_dvec3() / frame.scale + frame.center;
             let p = inst.world_from_object.transform_point3(object);
             (p, p)
         };

@@ -6,9 +6,14 @@
 //! has the bits of one march through the whole volume.
 
 use super::layer::MarchState;
-use super::{MACROCELL, Volume, VolumeQuality, VolumeReport, VolumeSample, scan};
+use super::{
+    Interpolation, MACROCELL, Volume, VolumeError, VolumeOptions, VolumeQuality, VolumeReport,
+    VolumeSample, scan,
+};
 use crate::grid::Grid;
-use glam::UVec3;
+use crate::transfer_function::TransferFunction;
+use fearless_simd::Level;
+use glam::{DVec3, UVec3};
 use std::sync::Arc;
 
 /// Ghost layers of points around a brick: a gradient uses the points on both sides of a cell's
@@ -24,7 +29,45 @@ pub struct Brick {
     pub end: UVec3,
 }
 
+/// A uniform grid without its values.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GridExtent {
+    /// Points per axis.
+    pub dims: UVec3,
+    /// World position of the first point.
+    pub origin: DVec3,
+    /// World distance between neighbouring points, positive.
+    pub spacing: DVec3,
+}
+
+impl GridExtent {
+    /// Cells per axis: between points, or boxes around them.
+    fn cells(&self, around_points: bool) -> UVec3 {
+        if around_points { self.dims } else { self.dims.saturating_sub(UVec3::ONE) }
+    }
+
+    /// Blocks per axis, of cells between points or of boxes around them.
+    pub fn blocks(&self, around_points: bool) -> UVec3 {
+        self.cells(around_points).map(|cells| cells.div_ceil(MACROCELL))
+    }
+}
+
 impl Brick {
+    /// No block.
+    pub const EMPTY: Brick = Brick { first: UVec3::ZERO, end: UVec3::ZERO };
+
+    /// The points of a grid of `dims` points that the part with this brick holds: from the first
+    /// to before the second. A brick without blocks holds one.
+    pub fn points(&self, dims: UVec3, around_points: bool) -> [UVec3; 2] {
+        if self.is_empty() {
+            return [UVec3::ZERO, UVec3::ONE];
+        }
+        let cells = if around_points { dims } else { dims - UVec3::ONE };
+        let low = (self.first * MACROCELL).saturating_sub(UVec3::splat(GHOSTS));
+        let end = (self.end.saturating_mul(UVec3::splat(MACROCELL))).min(cells);
+        [low, (end + UVec3::splat(GHOSTS + 1)).min(dims)]
+    }
+
     /// Whether it contains no block.
     pub fn is_empty(&self) -> bool {
         self.first.cmpge(self.end).any()
@@ -101,27 +144,25 @@ impl Volume {
     /// Whether a block that is held here has any extinction. False for blocks that a brick does not
     /// hold.
     pub fn is_occupied(&self, block: UVec3) -> bool {
-        block.cmplt(self.blocks).all() && self.occupied[self.block_index(block)]
+        self.held.contains(block) && self.occupied[self.block_index(block)]
     }
 
+    /// The index of a block that is held here.
     pub(super) fn block_index(&self, block: UVec3) -> usize {
-        let [x, y, z] = block.to_array().map(|b| b as usize);
-        (z * self.blocks.y as usize + y) * self.blocks.x as usize + x
+        let size = (self.held.end - self.held.first).as_usizevec3();
+        let at = (block - self.held.first).as_usizevec3();
+        (at.z * size.y + at.y) * size.x + at.x
     }
 
     /// The data that `brick` needs: the values of its cells with two ghost layers of points, for
     /// gradients. The rest of the volume is clear here. See [`RaySegments`](super::RaySegments) for
     /// an example.
     pub fn part(&self, brick: Brick) -> Volume {
-        let cells = self.cells();
-        let (mut ranges, mut report) =
-            (vec![[f32::INFINITY, f32::NEG_INFINITY]; self.ranges.len()], VolumeReport::default());
         let brick = Brick { first: brick.first, end: brick.end.min(self.blocks) };
-        let (low, high) = if brick.is_empty() {
-            (UVec3::ZERO, UVec3::ONE)
+        let [low, high] = if brick.is_empty() {
+            [self.first_point, self.first_point + UVec3::ONE]
         } else {
-            let low = (brick.first * MACROCELL).saturating_sub(UVec3::splat(GHOSTS));
-            (low, ((brick.end * MACROCELL).min(cells) + UVec3::splat(GHOSTS + 1)).min(self.dims))
+            brick.points(self.dims, self.is_nearest())
         };
         let low = low.max(self.first_point);
         let high = high.min(self.first_point + self.grid.dims);
@@ -140,14 +181,60 @@ impl Volume {
         let spacing = self.grid.spacing;
         let origin = self.origin + spacing * low.as_dvec3();
         let grid = Grid { dims: size, origin, spacing, values };
-        for z in brick.first.z..brick.end.z {
-            for y in brick.first.y..brick.end.y {
-                for x in brick.first.x..brick.end.x {
-                    let block = UVec3::new(x, y, z);
-                    let (first, end) =
-                        (block * MACROCELL, ((block + UVec3::ONE) * MACROCELL).min(cells));
-                    let (range, bad) = scan(&grid, first - low, end - low, self.is_nearest());
-                    ranges[self.block_index(block)] = range;
+        let whole = GridExtent { dims: self.dims, origin: self.origin, spacing };
+        let (transfer, options) = (self.transfer.clone(), self.options.clone());
+        Volume {
+            level: self.level,
+            ..Volume::of_points(whole, brick, low, grid, transfer, options)
+        }
+    }
+
+    /// The part of a volume that [`Volume::part`] of the whole would give, where nobody has the
+    /// whole. `values` are those of the points [`Brick::points`] of `brick`, x fastest.
+    ///
+    /// # Errors
+    /// [`VolumeError::NoCells`] and [`VolumeError::Shading`] as [`Volume::new`], and
+    /// [`VolumeError::Brick`] for another number of values or a grid that is none.
+    pub fn from_brick(
+        whole: GridExtent,
+        brick: Brick,
+        values: Vec<f32>,
+        transfer: TransferFunction,
+        options: VolumeOptions,
+    ) -> Result<Volume, VolumeError> {
+        if whole.dims.min_element() < 2 {
+            return Err(VolumeError::NoCells { dims: whole.dims });
+        }
+        options.check()?;
+        let nearest = options.interpolation == Interpolation::Nearest;
+        let blocks = whole.blocks(nearest);
+        let brick = Brick { first: brick.first.min(brick.end), end: brick.end.min(blocks) };
+        let [low, high] = brick.points(whole.dims, nearest);
+        let origin = whole.origin + whole.spacing * low.as_dvec3();
+        let grid = Grid::new(high - low, origin, whole.spacing, values)?;
+        Ok(Volume::of_points(whole, brick, low, grid, transfer, options))
+    }
+
+    /// A part that holds `grid`, whose first point is `low` in the whole.
+    fn of_points(
+        whole: GridExtent,
+        brick: Brick,
+        low: UVec3,
+        grid: Grid,
+        transfer: TransferFunction,
+        options: VolumeOptions,
+    ) -> Volume {
+        let nearest = options.interpolation == Interpolation::Nearest;
+        let cells = whole.cells(nearest);
+        let held = if brick.is_empty() { Brick::EMPTY } else { brick };
+        let (mut ranges, mut report) = (Vec::new(), VolumeReport::default());
+        for z in held.first.z..held.end.z {
+            for y in held.first.y..held.end.y {
+                for x in held.first.x..held.end.x {
+                    let first = UVec3::new(x, y, z) * MACROCELL;
+                    let end = (first + MACROCELL).min(cells);
+                    let (range, bad) = scan(&grid, first - low, end - low, nearest);
+                    ranges.push(range);
                     report.cells += (end - first).as_u64vec3().element_product();
                     report.cells_non_finite += bad;
                     report.macrocells += 1;
@@ -156,17 +243,18 @@ impl Volume {
         }
         let mut part = Volume {
             grid: Arc::new(grid),
-            transfer: self.transfer.clone(),
-            options: self.options.clone(),
-            dims: self.dims,
-            origin: self.origin,
+            transfer,
+            options,
+            dims: whole.dims,
+            origin: whole.origin,
             first_point: low,
+            held,
             ranges,
             occupied: Vec::new(),
             filled: Vec::new(),
-            blocks: self.blocks,
+            blocks: whole.blocks(nearest),
             report,
-            level: self.level,
+            level: Level::new(),
         };
         part.find_occupied();
         part

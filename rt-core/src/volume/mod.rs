@@ -24,7 +24,7 @@ mod reference;
 mod shading;
 mod shading_in_lanes;
 
-pub use brick::{Brick, PartialIntegral};
+pub use brick::{Brick, GridExtent, PartialIntegral};
 pub use options::{
     Blend, GradientOpacity, Interpolation, VolumeError, VolumeHighlight, VolumeLight,
     VolumeOptions, VolumeShading,
@@ -138,6 +138,8 @@ pub struct Volume {
     origin: DVec3,
     /// Point of the whole volume where `grid` begins.
     first_point: UVec3,
+    /// The blocks of `ranges` and `occupied`: all of them, unless this is a part.
+    held: Brick,
     /// Smallest and largest finite value of each block, x fastest.
     ranges: Vec<[f32; 2]>,
     /// Whether a block has any extinction.
@@ -145,6 +147,7 @@ pub struct Volume {
     /// Whether a block has extinction at all scalars of its range, so that none of its cells is
     /// clear.
     filled: Vec<bool>,
+    /// Per axis of the whole volume.
     blocks: UVec3,
     report: VolumeReport,
     level: Level,
@@ -188,6 +191,7 @@ impl Volume {
             dims,
             origin,
             first_point: UVec3::ZERO,
+            held: Brick { first: UVec3::ZERO, end: blocks },
             ranges,
             occupied: Vec::new(),
             filled: Vec::new(),
@@ -240,6 +244,11 @@ impl Volume {
     /// The transfer function.
     pub fn transfer_function(&self) -> &TransferFunction {
         &self.transfer
+    }
+
+    /// Interpolation, shading and blending.
+    pub fn options(&self) -> &VolumeOptions {
+        &self.options
     }
 
     /// Sizes, and cells left out.
@@ -356,10 +365,10 @@ impl Volume {
         batch: &mut CellBatch,
         m: &mut MarchState,
     ) {
-        let index = self.block_index(block);
-        if !(self.occupied[index] && tb > ta) {
+        if !(self.is_occupied(block) && tb > ta) {
             return;
         }
+        let index = self.block_index(block);
         let cells = self.cells().to_array().map(i64::from);
         let size = i64::from(MACROCELL);
         let first = block.to_array().map(|b| i64::from(b) * size);

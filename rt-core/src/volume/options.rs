@@ -1,5 +1,6 @@
 //! Appearance of a volume: shading, blending, and the checks of both.
 
+use crate::grid::GridError;
 use glam::{UVec3, Vec3};
 use std::sync::Arc;
 
@@ -15,6 +16,9 @@ pub enum VolumeError {
         /// Points per axis.
         dims: UVec3,
     },
+    /// The values of a brick do not fill it, or the grid that it is cut from is no grid.
+    #[error("volume brick: {0}")]
+    Brick(#[from] GridError),
     /// An invalid parameter of the shading, the lights or the gradient opacity.
     #[error("volume shading: {field} is {value}; it must be {rule}")]
     Shading {

@@ -42,6 +42,32 @@ pub enum MpiError {
     /// A second communicator for all ranks of the job.
     #[error("MPI was started before in this process: keep the communicator that was made then")]
     StartedTwice,
+    /// The surrounding program has not started MPI, or has ended it.
+    #[error(
+        "MPI is {state} in this process ({library}): call this between MPI_Init and MPI_Finalize \
+         of the program whose communicator it is"
+    )]
+    NotRunning {
+        /// "not started" or "ended".
+        state: &'static str,
+        /// The library that was asked.
+        library: String,
+    },
+    /// The surrounding program's MPI does not allow calls from this thread.
+    #[error(
+        "MPI was started with the thread level {level}, which allows calls from the main thread \
+         alone: call this there, or start MPI with MPI_THREAD_SERIALIZED"
+    )]
+    OtherThread {
+        /// `MPI_THREAD_SINGLE` or `MPI_THREAD_FUNNELED`.
+        level: &'static str,
+    },
+    /// The communicator cannot be used.
+    #[error("the communicator is {what}: give one over the ranks that work together")]
+    UnusableCommunicator {
+        /// What it is.
+        what: &'static str,
+    },
     /// A call failed while starting.
     #[error("{call} failed while starting MPI: {reason}")]
     Call {

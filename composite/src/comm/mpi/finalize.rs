@@ -5,6 +5,10 @@ use std::time::{Duration, Instant};
 
 impl Drop for MpiComm {
     fn drop(&mut self) {
+        // The surrounding program has ended MPI first: nothing can be sent any more.
+        if self.is_mpi_over() {
+            return;
+        }
         if std::thread::panicking() {
             self.abort("this rank panicked");
         }
@@ -35,6 +39,10 @@ impl Drop for MpiComm {
             std::thread::yield_now();
         }
 
+        if !self.finalize && self.aborted.is_none() {
+            self.free_duplicates();
+            return;
+        }
         // MPI_Finalize waits for all ranks, as at the end of every MPI program. After a fault not
         // all ranks reach it, and a rank that is still working may yet report one.
         if self.finalize && self.aborted.is_none() {

@@ -66,6 +66,11 @@ pub fn choose(variable: impl Fn(&str) -> Option<String>) -> Result<Choice, MpiEr
     Err(MpiError::NotLaunched)
 }
 
+/// Names under which a process may have loaded MPI.
+pub(super) fn loaded_names() -> impl Iterator<Item = &'static str> {
+    OPEN_MPI.iter().chain(MPICH).copied()
+}
+
 /// Number of processors of this machine. The standard library reports fewer where the launcher has
 /// bound each rank to its own.
 pub(super) fn processors_here() -> usize {

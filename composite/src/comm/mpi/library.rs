@@ -5,6 +5,10 @@ use super::launcher::{self, Choice};
 use libloading::os::unix::{Library, RTLD_GLOBAL, RTLD_LOCAL, RTLD_NOW};
 use std::ffi::{c_char, c_int, c_void};
 
+/// `RTLD_NOLOAD` of Linux: only what is loaded already.
+#[cfg(target_os = "linux")]
+const RTLD_NOLOAD: c_int = 4;
+
 /// A handle (communicator, data type, error handler, request) of any ABI.
 pub(crate) type Handle = usize;
 
@@ -75,6 +79,12 @@ functions! {
 /// `MPI_Comm_split_type`.
 pub(super) type SplitType =
     unsafe extern "C" fn(Handle, c_int, c_int, Handle, *mut Handle) -> c_int;
+/// `MPI_Comm_split`.
+pub(super) type Split = unsafe extern "C" fn(Handle, c_int, c_int, *mut Handle) -> c_int;
+/// `MPI_Query_thread`, `MPI_Is_thread_main` and `MPI_Finalized`.
+pub(super) type Query = unsafe extern "C" fn(*mut c_int) -> c_int;
+/// `MPI_Comm_test_inter`.
+pub(super) type TestInter = unsafe extern "C" fn(Handle, *mut c_int) -> c_int;
 /// `MPI_Comm_free`.
 pub(super) type CommFree = unsafe extern "C" fn(*mut Handle) -> c_int;
 
@@ -96,6 +106,13 @@ pub(crate) struct Mpi {
     /// Functions of MPI 3, which old libraries lack.
     pub(super) split_type: Option<SplitType>,
     pub(super) comm_free: Option<CommFree>,
+    // What a surrounding program's communicator needs besides.
+    pub(super) comm_null: Handle,
+    pub(super) split: Option<Split>,
+    pub(super) query_thread: Option<Query>,
+    pub(super) is_thread_main: Option<Query>,
+    pub(super) finalized: Option<Query>,
+    pub(super) test_inter: Option<TestInter>,
     // Last, so that nothing outlives it; never unloaded in practice, because MPI libraries leave
     // threads behind.
     _library: std::mem::ManuallyDrop<Library>,
@@ -113,6 +130,23 @@ impl Mpi {
         // Global, because Open MPI's plug-ins look for its symbols there.
         let (library, name) = open_first(&choice, RTLD_NOW | RTLD_GLOBAL)?;
         Self::of(library, &name)
+    }
+
+    /// The MPI that the surrounding program has started: that of the process, also where a plug-in
+    /// of the program (a Python module) has loaded it for itself.
+    pub(super) fn load_started() -> Result<Self, MpiError> {
+        let this = Library::this();
+        if has(&this, "MPI_Init") {
+            return Self::of(this, "this program");
+        }
+        #[cfg(target_os = "linux")]
+        for name in launcher::loaded_names() {
+            // SAFETY: the library is there already, or nothing is loaded.
+            if let Ok(library) = unsafe { Library::open(Some(name), RTLD_NOW | RTLD_NOLOAD) } {
+                return Self::of(library, name);
+            }
+        }
+        Self::load()
     }
 
     fn of(library: Library, name: &str) -> Result<Self, MpiError> {
@@ -147,11 +181,24 @@ impl Mpi {
         let constants = abi.constants();
         // SAFETY: the MPI standard fixes these functions' arguments, with handles as in
         // `Functions`.
-        let (split_type, comm_free) = unsafe {
+        let (split_type, comm_free, split, test_inter) = unsafe {
             (
                 library.get::<SplitType>(b"MPI_Comm_split_type").ok().map(|symbol| *symbol),
                 library.get::<CommFree>(b"MPI_Comm_free").ok().map(|symbol| *symbol),
+                library.get::<Split>(b"MPI_Comm_split").ok().map(|symbol| *symbol),
+                library.get::<TestInter>(b"MPI_Comm_test_inter").ok().map(|symbol| *symbol),
             )
+        };
+        let query = |name: &[u8]| {
+            // SAFETY: as above; all of them take a pointer to an int.
+            unsafe { library.get::<Query>(name) }.ok().map(|symbol| *symbol)
+        };
+        let (query_thread, is_thread_main, finalized) =
+            (query(b"MPI_Query_thread"), query(b"MPI_Is_thread_main"), query(b"MPI_Finalized"));
+        let comm_null = match abi {
+            Abi::OpenMpi => address("ompi_mpi_comm_null")?,
+            Abi::Mpich => 0x0400_0000,
+            Abi::Smpi => 0,
         };
         let library = std::mem::ManuallyDrop::new(library);
         Ok(Self {
@@ -166,6 +213,12 @@ impl Mpi {
             info_null,
             split_type,
             comm_free,
+            comm_null,
+            split,
+            query_thread,
+            is_thread_main,
+            finalized,
+            test_inter,
             _library: library,
         })
     }
@@ -176,6 +229,14 @@ impl Mpi {
             // SAFETY: the address of SMPI's variable of type MPI_Comm, a pointer, which lives as
             // long as the process.
             self.world = unsafe { (self.world as *const Handle).read() };
+        }
+    }
+
+    /// The error of a call, if it has one.
+    pub(super) fn checked(&self, call: &str, code: c_int) -> Result<(), MpiError> {
+        match code {
+            0 => Ok(()),
+            _ => Err(MpiError::Call { call: call.to_string(), reason: self.error_text(code) }),
         }
     }
 

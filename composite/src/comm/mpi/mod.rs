@@ -15,6 +15,7 @@ mod clock;
 mod error;
 mod finalize;
 mod heartbeat;
+mod host_program;
 pub mod launcher;
 mod library;
 mod notice;
@@ -66,8 +67,9 @@ const STARTUP_TIMEOUT: Duration = Duration::from_secs(300);
 /// How often a waiting rank polls for notices.
 const NOTICE_INTERVAL: Duration = Duration::from_millis(1);
 
-/// All ranks of the MPI job that this process belongs to. There is one per process, and only the
-/// thread that made it may use it.
+/// The ranks of an MPI communicator: of the job that this process belongs to
+/// ([`MpiComm::world`]), or of a communicator that the surrounding program has made
+/// ([`MpiComm::from_handle`]). Only the thread that made it may use it.
 ///
 /// Dropping it leaves the group and ends MPI (`MPI_Finalize`) if this object started it, unless the
 /// group was aborted.
@@ -125,12 +127,8 @@ impl MpiComm {
 
         // Start MPI, unless the surrounding program has.
         let mut initialized: c_int = 0;
-        let check = |mpi: &Mpi, call: &str, code: c_int| match code {
-            0 => Ok(()),
-            _ => Err(MpiError::Call { call: call.to_string(), reason: mpi.error_text(code) }),
-        };
         // SAFETY: MPI_Initialized may be called at any time.
-        check(&mpi, "MPI_Initialized", unsafe {
+        mpi.checked("MPI_Initialized", unsafe {
             (mpi.functions.initialized)(&raw mut initialized)
         })?;
         if initialized == 0 {
@@ -149,28 +147,39 @@ impl MpiComm {
                     )
                 }
             };
-            check(&mpi, "MPI_Init", code)?;
+            mpi.checked("MPI_Init", code)?;
         }
         mpi.started();
 
+        let world = mpi.world;
+        Self::duplicating(Rc::new(mpi), world, chunk_bytes, initialized == 0)
+    }
+
+    /// All ranks of the communicator `base`, which is duplicated and not used after that.
+    fn duplicating(
+        mpi: Rc<Mpi>,
+        base: Handle,
+        chunk_bytes: usize,
+        finalize: bool,
+    ) -> Result<Self, MpiError> {
         // Separate communicators, so that no message is mistaken for one of the surrounding
         // program.
         let duplicate = || {
             let mut comm: Handle = 0;
-            // SAFETY: every rank of the job makes the same calls in the same order.
-            let code = unsafe { (mpi.functions.comm_dup)(mpi.world, &raw mut comm) };
-            check(&mpi, "MPI_Comm_dup", code)?;
+            // SAFETY: every rank of `base` makes the same calls in the same order.
+            let code = unsafe { (mpi.functions.comm_dup)(base, &raw mut comm) };
+            mpi.checked("MPI_Comm_dup", code)?;
             // SAFETY: a communicator that was just made, and a predefined error handler.
             let code = unsafe { (mpi.functions.set_error_handler)(comm, mpi.errors_return) };
-            check(&mpi, "MPI_Comm_set_errhandler", code)?;
+            mpi.checked("MPI_Comm_set_errhandler", code)?;
             Ok(comm)
         };
         let (messages, notices) = (duplicate()?, duplicate()?);
         let (mut rank, mut size): (c_int, c_int) = (0, 0);
         // SAFETY: plain queries of a valid communicator.
         unsafe {
-            check(&mpi, "MPI_Comm_rank", (mpi.functions.comm_rank)(messages, &raw mut rank))?;
-            check(&mpi, "MPI_Comm_size", (mpi.functions.comm_size)(messages, &raw mut size))?;
+            mpi.checked("MPI_Comm_rank", (mpi.functions.comm_rank)(messages, &raw mut rank))?;
+            mpi.checked("MPI_Comm_size", (mpi.functions.comm_size)(messages, &raw mut size))?;
         }
         let (rank, size) = (rank as usize, size as usize);
 
@@ -186,8 +195,8 @@ impl MpiComm {
             aborted: None,
             oversubscribed: false,
             nodes: (0..size).collect(),
-            finalize: initialized == 0,
-            mpi: Rc::new(mpi),
+            finalize,
+            mpi,
             #[cfg(target_os = "linux")]
             delay_after_collectives: Duration::ZERO,
             #[cfg(target_os = "linux")]

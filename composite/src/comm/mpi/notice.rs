@@ -44,6 +44,10 @@ impl Notices {
         Self { comm, sent: Vec::new() }
     }
 
+    pub(super) fn comm(&self) -> Handle {
+        self.comm
+    }
+
     pub(super) fn send_left(&mut self, mpi: &Mpi, others: impl Iterator<Item = usize>) {
         self.send(mpi, others, vec![LEFT]);
     }

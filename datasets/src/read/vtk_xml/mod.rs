@@ -9,7 +9,10 @@
 pub(crate) mod blocks;
 mod file;
 mod parallel;
+mod piece_files;
 pub(crate) mod pieces;
+
+pub use piece_files::{PieceFiles, piece_files};
 
 use super::{Content, LoadedFile, ReadError, TimeStep};
 use crate::model::Dataset;

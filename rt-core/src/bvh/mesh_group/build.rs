@@ -85,10 +85,11 @@ pub(in crate::bvh) fn build_group(
     let build = |k: usize| {
         if let Some(old) = known.and_then(|trees| trees.get(&address_of(geometry_of(k))))
             && old.blas.frame == input.frame
+            && let Some(blas) = Blas::as_part_of(old.blas, input.reach.map(|r| (input.frame, r)))
             && let Some(source) = source_of(old, previous)
         {
             input.progress.advance(size_of(k))?;
-            return Ok((Arc::clone(old.blas), source));
+            return Ok((blas, source));
         }
         let mesh = input.sources.triangles(geometry_of(k));
         let tree =
@@ -134,14 +135,20 @@ fn unchanged_group(
     known: &KnownTrees<'_>,
     group: &Arc<MeshGroup>,
 ) -> Option<BuiltGroup> {
-    if group.frame != input.frame || group.members.len() != input.members.len() {
+    let same_reach = match input.reach {
+        Some(reach) => reach == group.reach,
+        None => group.reach == group.bvh.bounds,
+    };
+    let same_place = same_reach && group.frame == input.frame;
+    if !same_place || group.members.len() != input.members.len() {
         return None;
     }
     let same = |(m, &instance): (&Member, &u32)| {
         let geometry = input.instances[instance as usize].geometry;
         let old = known.get(&input.sources.geometries[geometry].address())?;
         (m.instance == instance && m.geometry == geometry && old.geometry == geometry)
-            .then(|| Arc::clone(old.blas))
+            .then(|| Blas::as_part_of(old.blas, input.reach.map(|r| (input.frame, r))))
+            .flatten()
     };
     let blas = group.members.iter().zip(input.members).map(same).collect::<Option<Vec<_>>>()?;
     Some((Arc::clone(group), blas))

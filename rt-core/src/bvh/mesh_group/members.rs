@@ -1,6 +1,6 @@
 //! Which instances share one tree, and in which coordinates.
 
-use crate::bvh::geometry::{Geometry, Instance};
+use crate::bvh::geometry::{Geometry, Instance, MeshExtent};
 use crate::bvh::layout::local_frame::LocalFrame;
 use crate::math::Aabb;
 use glam::{DAffine3, DVec3};
@@ -34,10 +34,20 @@ pub(in crate::bvh) fn choose_members(
     geometries: &[Geometry],
     instances: &[Instance],
 ) -> Option<GroupChoice> {
+    members_among(instances, geometries.len(), |g| geometries[g].mesh_extent())
+}
+
+/// The same for `geometries` geometries of which `extent_of` tells the extents; `None` for shapes.
+/// It is asked once about each geometry that may be a member.
+pub(in crate::bvh) fn members_among(
+    instances: &[Instance],
+    geometries: usize,
+    extent_of: impl Fn(usize) -> Option<MeshExtent> + Sync,
+) -> Option<GroupChoice> {
     if instances.len() < 2 {
         return None;
     }
-    let mut uses = vec![0u32; geometries.len()];
+    let mut uses = vec![0u32; geometries];
     for i in instances {
         uses[i.geometry] += 1;
     }
@@ -45,7 +55,7 @@ pub(in crate::bvh) fn choose_members(
         if uses[instance.geometry] != 1 || instance.world_from_object != DAffine3::IDENTITY {
             return None;
         }
-        let mesh = geometries[instance.geometry].mesh_extent()?;
+        let mesh = extent_of(instance.geometry)?;
         let b = mesh.bounds;
         let corners = [b.min, b.max].map(|p| p.as_dvec3() + mesh.origin);
         let usable = !b.is_empty() && mesh.triangles > 0;

@@ -27,7 +27,7 @@ use crate::ray::{HitBlock, LANES, NO_HIT};
 use assemble::assemble;
 pub(super) use build::{GroupInput, KnownTree, KnownTrees, build_group};
 use glam::{DAffine3, DVec3};
-pub(super) use members::{GroupChoice, GroupLayout, choose_members};
+pub(super) use members::{GroupChoice, GroupLayout, choose_members, members_among};
 use std::ops::Range;
 
 /// A mesh of the group.
@@ -120,6 +120,11 @@ impl MeshGroup {
         let bounds = [self.reach, self.bvh.bounds];
         self.placement = place(&self.frame, bounds, origin).unwrap_or(self.placement);
     }
+}
+
+/// The placement of a group that has everything in `layout`.
+pub(super) fn place_group(layout: &GroupLayout, origin: DVec3) -> Option<Placement> {
+    place(&layout.frame, [layout.reach; 2], origin)
 }
 
 /// Members have no transforms. `None` cannot happen with finite bounds.

@@ -245,13 +245,12 @@ impl<'a> BuildRequest<'a> {
         // ---- Geometries with a tree of their own.
         let build_alone = |i: usize| {
             let g = &geometries[i];
-            let shared = match (known.as_ref().and_then(|k| k.get(&g.address())), g) {
-                (Some(old), Geometry::Mesh(_) | Geometry::Slices(_))
-                    if old.blas.bvh().is_some() =>
-                {
-                    Arc::clone(old.blas)
-                }
-                (Some(old), Geometry::Shape(s)) => Blas::with_shape(old.blas, s),
+            let given = whole.map(|w| w.geometries[i]);
+            let old = known.as_ref().and_then(|k| k.get(&g.address()));
+            let old = old.and_then(|old| Blas::as_part_of(old.blas, given));
+            let shared = match (old, g) {
+                (Some(old), Geometry::Mesh(_) | Geometry::Slices(_)) if old.bvh().is_some() => old,
+                (Some(old), Geometry::Shape(s)) => Blas::with_shape(&old, s),
                 _ => return Ok(Arc::new(blas_of(i, sources, options, whole, progress)?)),
             };
             progress.advance(g.num_primitives())?;
@@ -264,7 +263,10 @@ impl<'a> BuildRequest<'a> {
 
         // ---- The meshes that share one tree, in render space.
         let origin = whole.map_or_else(
-            || choose_origin(&instances, &blas, choice.as_ref()),
+            || {
+                let space_of = |g: usize| blas[g].as_ref().map(|b| (b.frame, b.bounds()));
+                choose_origin(&instances, space_of, choice.as_ref())
+            },
             |whole| whole.origin,
         );
         let mut notes = Vec::new();
