@@ -97,6 +97,32 @@ fn a_case_one_cell_thick_is_a_plane_and_gets_its_depth_back() {
 }
 
 #[test]
+fn a_case_between_wedges_has_the_radius_as_y() {
+    let flat = read(&case(Form::Binary, "wedge"));
+    let g = grid(&flat);
+    assert_eq!((g.points.len(), g.types.as_slice()), (8, [9; 3].as_slice()));
+    for i in 0..8 {
+        let p = g.points.get(i);
+        let nearest = [p.x.round().clamp(0.0, 3.0), p.y.round().clamp(1.0, 2.0), 0.0];
+        assert!((p - nearest.into()).abs().max_element() < 1e-14, "{p}");
+    }
+    assert!(flat.warnings.join("\n").contains("axisymmetric"));
+}
+
+#[test]
+fn points_that_move_are_those_of_the_last_time_they_were_written() {
+    let mut files = case(Form::Text, "patch");
+    let points = files.iter().find(|f| f.0 == "constant/polyMesh/points").unwrap();
+    let moved = String::from_utf8(points.1.clone()).unwrap().replace("\n(3 1 1)", "\n(3.5 1 1)");
+    files.push(("0.125/polyMesh/points".into(), moved.into_bytes()));
+    let dir = tempfile::tempdir().unwrap();
+    write(dir.path(), &files);
+    let corner = |path: &std::path::Path| grid(&open(path).unwrap()).points.get(15).x;
+    assert_eq!(corner(dir.path()), 3.5);
+    assert_eq!(corner(&dir.path().join("0")), 3.0);
+}
+
+#[test]
 fn faults_name_the_file_the_place_and_a_cure() {
     let replaced = |name: &str, from: &str, to: &str| {
         let mut files = case(Form::Text, "patch");

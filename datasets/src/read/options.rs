@@ -37,7 +37,7 @@ impl OpenOptions {
 }
 
 fn refused(name: &str, value: impl std::fmt::Display, cure: &str) -> Fault {
-    Fault::new(At::Field(format!("the option `{name}`")), format!("it is {value}"), cure)
+    Fault::option(At::Field(format!("the option `{name}`")), format!("it is {value}"), cure)
 }
 
 /// Number of times at both ends that messages list.

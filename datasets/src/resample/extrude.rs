@@ -132,3 +132,73 @@ pub(super) fn extruded(d: &UnstructuredGrid, span: f64) -> Option<Extruded> {
     }
     Some(Extruded { grid, source, left_out })
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::model::{Cells, DataArray, Dataset, Points, PolyData, UnstructuredGrid, Values};
+    use crate::resample::{Lattice, Mark, Mesh, Options, Plane, Resolution, Samples, resample};
+
+    /// A rectangle of 4 by 2 as triangles, a quad that runs backwards and a pentagon, in the plane
+    /// z = 3; the points are turned so that y is the axis across if `upright`.
+    fn rectangle(upright: bool) -> UnstructuredGrid {
+        let points =
+            [[0., 0.], [1., 0.], [2., 0.], [4., 0.], [4., 2.], [2., 2.], [0., 2.], [3., 2.]];
+        let place = |[a, b]: [f64; 2]| if upright { [a, 3.0, b] } else { [a, b, 3.0] };
+        let mut d = UnstructuredGrid {
+            points: Points::F64(points.map(place).to_vec()),
+            types: vec![5, 9, 7],
+            ..Default::default()
+        };
+        d.cells.push([0, 1, 6]);
+        d.cells.push([1, 6, 5, 2]);
+        d.cells.push([2, 3, 4, 7, 5]);
+        d.attributes.cell.push(DataArray::new("c", 1, Values::F64(vec![1.0, 2.0, 3.0])));
+        d
+    }
+
+    #[test]
+    fn polygons_of_all_sizes_fill_the_space_over_their_plane() {
+        for upright in [false, true] {
+            let data = Dataset::UnstructuredGrid(rectangle(upright));
+            let mesh = Mesh::with_plane(&data, Plane::Extrude { span: 0.5 }).unwrap();
+            assert_eq!((mesh.num_cells(), mesh.num_points(), mesh.left_out()), (3, 16, 0));
+            let (low, high) = mesh.bounds();
+            let expected = if upright { [4.0, 0.5, 2.0] } else { [4.0, 2.0, 0.5] };
+            assert_eq!((high - low).to_array(), expected);
+            let value = |i: usize| 1.0 + 2.0 * mesh.point(i).x + mesh.point(i).y + mesh.point(i).z;
+            let values: Vec<f64> = (0..16).map(value).collect();
+            let lattice =
+                Lattice::fit(low, high, mesh.typical_cell(), Resolution::Longest(33)).unwrap();
+            let fine =
+                resample(&mesh, Samples::Points(&values), &lattice, &Options::default()).unwrap();
+            assert!(fine.marks.iter().all(|m| *m == Mark::Inside), "upright: {upright}");
+            assert_eq!(mesh.gather_cells(&data, |a, i| a.cell[0].get(i, 0)), [1.0, 2.0, 3.0]);
+            let of_points = mesh.gather_points(&data, |_, i| i as f64);
+            assert_eq!((of_points[3], of_points[8 + 3]), (3.0, 3.0));
+        }
+    }
+
+    #[test]
+    fn a_slice_saved_as_a_surface_keeps_the_values_of_its_cells() {
+        let grid = rectangle(false);
+        let mut lines = Cells::new();
+        lines.push([0, 3]);
+        let values = DataArray::new("c", 1, Values::F64(vec![0.0, 1.0, 2.0, 3.0]));
+        let mut slice =
+            PolyData { points: grid.points, polys: grid.cells, lines, ..Default::default() };
+        slice.attributes.cell.push(values);
+        let data = Dataset::PolyData(slice);
+        let mesh = Mesh::with_plane(&data, Plane::Extrude { span: 1.0 }).unwrap();
+        assert_eq!(mesh.gather_cells(&data, |a, i| a.cell[0].get(i, 0)), [1.0, 2.0, 3.0]);
+    }
+
+    #[test]
+    fn a_curved_surface_gets_no_depth() {
+        let mut grid = rectangle(false);
+        let Points::F64(points) = &mut grid.points else { unreachable!() };
+        points[4][2] = 3.1;
+        let data = Dataset::UnstructuredGrid(grid);
+        let error = Mesh::with_plane(&data, Plane::Extrude { span: 1.0 }).unwrap_err();
+        assert!(error.to_string().contains("save the volume"), "{error}");
+    }
+}

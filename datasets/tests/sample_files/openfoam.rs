@@ -82,7 +82,16 @@ impl Row {
         for k in 0..2 {
             for j in 0..2 {
                 for i in 0..=n {
-                    points.extend([(self.start + i) as f64, j as f64, k as f64]);
+                    let x = (self.start + i) as f64;
+                    points.extend(match self.across {
+                        // Radii of 1 and 2, at angles of -0.05 and 0.05 about the x axis.
+                        "wedge" => {
+                            let (sin, cos) = (0.1 * k as f64 - 0.05).sin_cos();
+                            let radius = 1.0 + j as f64;
+                            [x, radius * cos, radius * sin]
+                        }
+                        _ => [x, j as f64, k as f64],
+                    });
                 }
             }
         }

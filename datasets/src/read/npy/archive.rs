@@ -2,7 +2,7 @@
 
 use super::array::StoredArray;
 use crate::read::ReadError;
-use crate::read::error::{At, BROKEN, Fault, io_error};
+use crate::read::error::{At, BROKEN, Fault, FaultKind, io_error};
 use std::path::Path;
 use zip::result::ZipError;
 
@@ -51,7 +51,7 @@ pub(super) fn arrays(
         let available = member.size().min(packed.saturating_mul(MAX_RATIO));
         match StoredArray::read(name.to_string(), &mut member, available) {
             Ok(array) => arrays.push(array),
-            Err(f) if f.unsupported => {
+            Err(f) if f.kind == FaultKind::Unsupported => {
                 warnings.push(format!("array `{name}` left out: {} ({})", f.what, f.at));
             }
             Err(f) => {

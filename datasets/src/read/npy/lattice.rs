@@ -134,7 +134,7 @@ fn geometry(
     check_dims(dims)?;
     let Some(spacing) = spacing else {
         let what = format!("`{}` has the shape {:?}, but no coordinates", model.name, model.shape);
-        return Err(Fault::new(At::Field("the lattice".into()), what, placement.cure()));
+        return Err(Fault::option(At::Field("the lattice".into()), what, placement.cure()));
     };
     let origin = origin.unwrap_or([0.0; 3]);
     for (name, v, ok) in [

@@ -34,6 +34,11 @@ pub fn is_case(path: &Path) -> bool {
     case_folder::locate(path).is_some()
 }
 
+/// Whether the path is that of a case, and not of one of its times.
+pub fn is_whole_case(path: &Path) -> bool {
+    case_folder::locate(path).is_some_and(|(_, time)| time.is_none())
+}
+
 /// Reads a case at its last time, or at the time that the path or the options name.
 ///
 /// # Errors
@@ -43,7 +48,7 @@ pub fn read(path: &Path, options: &OpenOptions) -> Result<LoadedFile, ReadError>
     options.refuse_lattice().map_err(fault)?;
     let Some((root, named)) = case_folder::locate(path) else {
         let what = "it is neither a case nor a time of one";
-        return Err(fault(Fault::new(
+        return Err(fault(Fault::option(
             super::At::Field("the folder".into()),
             what,
             "name the folder that holds constant and system, or a .foam file in it",
