@@ -104,7 +104,7 @@ fn a_case_between_wedges_has_the_radius_as_y() {
     for i in 0..8 {
         let p = g.points.get(i);
         let nearest = [p.x.round().clamp(0.0, 3.0), p.y.round().clamp(1.0, 2.0), 0.0];
-        assert!((p - nearest.into()).abs().max_element() < 1e-14, "{p}");
+        assert!((p - glam::DVec3::from(nearest)).abs().max_element() < 1e-14, "{p}");
     }
     assert!(flat.warnings.join("\n").contains("axisymmetric"));
 }
