@@ -172,7 +172,7 @@ fn rectilinear(given: Vec<StoredArray>) -> Result<([usize; 3], usize, Geometry),
             return Err(Fault::new(at(), what, "save all with one axis, or all as numpy.meshgrid"));
         }
         let x: Vec<f64> = (0..array.values.len()).map(|i| array.values.get_f64(i)).collect();
-        let wrong = x.windows(3).position(|w| !((w[1] - w[0]) * (w[2] - w[1]) > 0.0));
+        let wrong = x.windows(3).position(|w| (w[1] - w[0]) * (w[2] - w[1]) <= 0.0);
         let pair = x.len() == 2 && x[0] == x[1];
         if let Some(i) = wrong.map(|i| i + 1).or(pair.then_some(1)) {
             let what = format!("value {i} is {}, after {}", x[i], x[i - 1]);
