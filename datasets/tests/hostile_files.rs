@@ -5,6 +5,7 @@ mod sample_files;
 
 use datasets::read::{Content, LoadedFile, ReadError, open};
 use proptest::prelude::*;
+use sample_files::openfoam::{Form, case, decomposed, write};
 use std::path::Path;
 
 /// Reads bytes as a file of this name, and applies all conversions.
@@ -193,6 +194,34 @@ proptest! {
     }
 }
 
+proptest! {
+    // Each case writes a dozen files.
+    #![proptest_config(ProptestConfig {
+        cases: cases() / 5,
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    })]
+
+    #[test]
+    fn every_damage_to_an_openfoam_case_is_survived(
+        form in prop::sample::select(vec![Form::Text, Form::Binary, Form::Zipped]),
+        across in prop::sample::select(vec!["patch", "empty", "wedge"]),
+        in_parts in any::<bool>(),
+        damages in prop::collection::vec((any::<prop::sample::Index>(), damage()), 1..4),
+    ) {
+        let mut files = if in_parts { decomposed(form) } else { case(form, across) };
+        let count = files.len();
+        damages.iter().for_each(|(file, d)| apply(&mut files[file.index(count)].1, d));
+        let dir = tempfile::tempdir().unwrap();
+        write(dir.path(), &files);
+        match open(dir.path()) {
+            Ok(opened) => use_all(&opened),
+            Err(e) => prop_assert!(e.to_string().contains("; "), "no cure in: {e}"),
+        }
+        assert_memory_is_bounded();
+    }
+}
+
 /// Asserts that the file is rejected with a message that contains all of `words`.
 fn refused(name: &str, bytes: &[u8], words: &[&str]) {
     let e = read_and_use(name, bytes).err().unwrap_or_else(|| panic!("{name} was read"));
@@ -284,6 +313,10 @@ fn files_that_name_themselves_end_with_an_error() {
             "loop.vtm",
             "<VTKFile type=\"vtkMultiBlockDataSet\"><vtkMultiBlockDataSet><DataSet \
              file=\"loop.vtm\"/></vtkMultiBlockDataSet></VTKFile>",
+        ),
+        (
+            "loop.series",
+            "{\"file-series-version\": \"1.0\", \"files\": [{\"name\": \"loop.pvd\", \"time\": 0}]}",
         ),
     ] {
         let path = dir.path().join(name);

@@ -91,8 +91,8 @@ struct ReportArgs {
 /// Options of `bench render`.
 #[derive(Debug, Args)]
 struct RenderArgs {
-    /// VTK (.vtp .vtu .vti .vtr .vts, parallel, .pvd, legacy), PLOT3D, NRRD, MetaImage, OBJ, glTF,
-    /// PLY, STL
+    /// VTK (.vtp .vtu .vti .vtr .vts, parallel, .pvd, legacy), PLOT3D, NRRD, MetaImage, NumPy, OBJ,
+    /// glTF, PLY, STL, or the folder of an OpenFOAM case
     file: PathBuf,
     /// The image as PNG
     #[arg(long, short, value_name = "PNG", required_unless_present = "exr")]

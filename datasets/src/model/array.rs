@@ -269,6 +269,10 @@ impl Values {
             with_values!(self, v => v[range].iter().map(|&x| x as T).collect())
         ))
     }
+    /// The values at `indices`, in their order; the type is kept. Panics when one is out of range.
+    pub(crate) fn gathered(&self, indices: impl Iterator<Item = usize>) -> Values {
+        with_values!(self, v => indices.map(|i| v[i]).collect::<Vec<_>>().into_values())
+    }
     /// Appends `other`, which must have the same type; otherwise both become f64.
     pub fn append(&mut self, other: &Values) {
         match (&mut *self, other) {

@@ -66,6 +66,12 @@ impl Cells {
         u32::try_from(value).unwrap_or(Self::NO_POINT)
     }
 
+    /// Removes all cells and keeps the memory.
+    pub fn clear(&mut self) {
+        self.offsets.truncate(1);
+        self.connectivity.clear();
+    }
+
     /// Appends a cell.
     pub fn push(&mut self, ids: impl IntoIterator<Item = u32>) {
         self.connectivity.extend(ids);

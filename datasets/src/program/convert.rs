@@ -1,5 +1,6 @@
 //! `datasets convert`.
 
+use super::open_args::OpenArgs;
 use super::output::{self, EncodingArgs};
 use anyhow::Context as _;
 use clap::Args;
@@ -14,10 +15,12 @@ use std::path::PathBuf;
 #[command(after_help = "Examples:
   datasets convert mesh.stl mesh.ply
   datasets convert flow.vtk flow.vti --compress
+  datasets convert case flow.vtu --time 0.002
+  datasets convert rho.npy rho.vti --spacing 0.1,0.1,0.1
   datasets convert mesh.vtu surface.vtp --color-by pressure
   datasets convert wedge.vti shock.obj --isovalue 1.5")]
 pub(super) struct ConvertArgs {
-    /// A file of any format that can be read
+    /// A file of any format that can be read, or the folder of an OpenFOAM case
     #[arg(value_name = "IN")]
     input: PathBuf,
     /// The new file: .vti .vtp .vtu .vtr .vts .vtm, .ply, .obj or .glb. Other kinds of data are
@@ -35,15 +38,18 @@ pub(super) struct ConvertArgs {
     array: Option<String>,
     #[command(flatten)]
     encoding: EncodingArgs,
+    #[command(flatten)]
+    open: OpenArgs,
 }
 
 /// Reads one file and writes the other.
 pub(super) fn convert(common: CommonArgs, args: &ConvertArgs) -> anyhow::Result<()> {
     output::check_name(&args.output)?;
-    let file = read::open(&args.input)?;
+    let file = read::open_with(&args.input, &args.open.options())?;
     file.warnings.iter().for_each(|w| common.warn(w));
-    if file.time_steps.len() > 1 {
-        common.warn(format!("only the first of {} times is converted", file.time_steps.len()));
+    if file.time_steps.len() > 1 && !args.open.has_time() {
+        let times = file.time_steps.len();
+        common.warn(format!("only one of {times} times is converted; --time chooses another"));
     }
     let content = match (file.content, args.isovalue) {
         (Content::Data(data), None) => output::Content::Data(data),

@@ -1,5 +1,6 @@
 //! `datasets info`.
 
+use super::open_args::OpenArgs;
 use clap::Args;
 use datasets::cli::CommonArgs;
 use datasets::model::{DataArray, Dataset};
@@ -11,10 +12,13 @@ use std::path::PathBuf;
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   datasets info wavelet.vtp
+  datasets info case --time 0.002
   datasets info --json jet.vti | jq '.parts[].arrays[].name'")]
 pub(super) struct InfoArgs {
-    /// A file of any format that can be read
+    /// A file of any format that can be read, or the folder of an OpenFOAM case
     file: PathBuf,
+    #[command(flatten)]
+    open: OpenArgs,
 }
 
 #[derive(Serialize)]
@@ -28,7 +32,7 @@ struct Info {
     textures: usize,
     /// Blocks of a collection, meshes of a scene, or the one data set.
     parts: Vec<Part>,
-    /// Times of a series; the other fields describe the first time.
+    /// Times of a series or case; the other fields describe the one that was read.
     times: Vec<f64>,
     warnings: Vec<String>,
 }
@@ -57,7 +61,7 @@ struct Array {
 
 /// Prints what a file holds.
 pub(super) fn info(common: CommonArgs, args: &InfoArgs) -> anyhow::Result<()> {
-    let file = read::open(&args.file)?;
+    let file = read::open_with(&args.file, &args.open.options())?;
     let mut info = Info {
         file: args.file.display().to_string(),
         format: file.format,

@@ -4,6 +4,7 @@ mod convert;
 mod info;
 mod list;
 mod make;
+mod open_args;
 mod output;
 
 use clap::{Parser, Subcommand};

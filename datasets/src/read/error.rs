@@ -67,6 +67,18 @@ pub enum ReadError {
         /// What to do.
         cure: String,
     },
+    /// An option is missing or means nothing to the file, which itself may be sound.
+    #[error("{}: {at}: {what}; {cure}", path.display())]
+    Option {
+        /// The file.
+        path: PathBuf,
+        /// The option, or what needs one.
+        at: At,
+        /// What is wrong, with the value found.
+        what: String,
+        /// What to do.
+        cure: String,
+    },
     /// Neither the file extension nor the content identifies the format.
     #[error("{}: unknown kind of file ({what}); files read here: {known}", path.display())]
     UnknownFormat {
@@ -86,6 +98,7 @@ impl ReadError {
             ReadError::Io { path, .. }
             | ReadError::Malformed { path, .. }
             | ReadError::Unsupported { path, .. }
+            | ReadError::Option { path, .. }
             | ReadError::UnknownFormat { path, .. } => path,
         }
     }
@@ -97,7 +110,15 @@ pub(crate) struct Fault {
     pub(crate) at: At,
     pub(crate) what: String,
     pub(crate) cure: String,
-    pub(crate) unsupported: bool,
+    pub(crate) kind: FaultKind,
+}
+
+/// Which error a fault becomes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum FaultKind {
+    Malformed,
+    Unsupported,
+    Option,
 }
 
 /// The cure for a file that is shorter than it declares.
@@ -108,21 +129,24 @@ pub(crate) const BROKEN: &str =
 
 impl Fault {
     pub(crate) fn new(at: At, what: impl Into<String>, cure: impl Into<String>) -> Self {
-        Fault { at, what: what.into(), cure: cure.into(), unsupported: false }
+        Fault { at, what: what.into(), cure: cure.into(), kind: FaultKind::Malformed }
     }
     pub(crate) fn field(field: impl Into<String>, what: impl Into<String>) -> Self {
         Fault::new(At::Field(field.into()), what, BROKEN)
     }
     pub(crate) fn unsupported(at: At, what: impl Into<String>, cure: impl Into<String>) -> Self {
-        Fault { at, what: what.into(), cure: cure.into(), unsupported: true }
+        Fault { at, what: what.into(), cure: cure.into(), kind: FaultKind::Unsupported }
+    }
+    pub(crate) fn option(at: At, what: impl Into<String>, cure: impl Into<String>) -> Self {
+        Fault { at, what: what.into(), cure: cure.into(), kind: FaultKind::Option }
     }
     pub(crate) fn in_file(self, path: &Path, format: &'static str) -> ReadError {
-        let Fault { at, what, cure, unsupported } = self;
+        let Fault { at, what, cure, kind } = self;
         let path = path.to_path_buf();
-        if unsupported {
-            ReadError::Unsupported { path, format, at, what, cure }
-        } else {
-            ReadError::Malformed { path, format, at, what, cure }
+        match kind {
+            FaultKind::Malformed => ReadError::Malformed { path, format, at, what, cure },
+            FaultKind::Unsupported => ReadError::Unsupported { path, format, at, what, cure },
+            FaultKind::Option => ReadError::Option { path, at, what, cure },
         }
     }
 }

@@ -10,9 +10,12 @@ pub mod csv_lattice;
 pub mod error;
 pub mod gltf;
 pub mod mhd;
+pub mod npy;
 pub mod nrrd;
 pub mod obj;
 mod open;
+pub mod openfoam;
+mod options;
 pub(crate) mod percent;
 pub mod plot3d;
 pub mod ply;
@@ -24,7 +27,8 @@ pub mod vtk_legacy;
 pub mod vtk_xml;
 
 pub use error::{At, ReadError};
-pub use open::{KNOWN, open};
+pub use open::{KNOWN, open, open_with};
+pub use options::OpenOptions;
 pub use scene::{AlphaMode, SceneMesh, SceneModel, SurfaceMaterial, Texture};
 
 use crate::model::{Dataset, ModelError, SurfaceReport};
@@ -40,8 +44,8 @@ pub struct LoadedFile {
     pub content: Content,
     /// What was left out or repaired, one sentence each; empty if nothing was.
     pub warnings: Vec<String>,
-    /// For a time series: every file with its time, in order. `content` holds the first time; open
-    /// the others by their path.
+    /// For a time series or a case: every time with its path, in order. `content` holds one of them
+    /// ([`OpenOptions::time`]); open the others by their path.
     pub time_steps: Vec<TimeStep>,
 }
 

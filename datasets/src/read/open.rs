@@ -2,16 +2,17 @@
 
 use super::error::{io_error, read_bytes};
 use super::{
-    LoadedFile, ReadError, gltf, mhd, nrrd, obj, plot3d, ply, raw, stl, vtk_legacy, vtk_xml,
+    LoadedFile, OpenOptions, ReadError, gltf, mhd, npy, nrrd, obj, openfoam, plot3d, ply, raw, stl,
+    vtk_legacy, vtk_xml,
 };
 use std::io::Read;
 use std::path::Path;
 
 /// The supported formats, for messages.
-pub const KNOWN: &str = "VTK XML (.vti .vtp .vtu .vtr .vts, their parallel forms, .pvd, .vtm), VTK \
+pub const KNOWN: &str = "VTK XML (.vti .vtp .vtu .vtr .vts, their parallel forms, .pvd, .vtm, .series), VTK \
                          legacy (.vtk), \
                          PLOT3D (.xyz .x .g .q .bin), NRRD (.nrrd .nhdr), MetaImage (.mhd .mha), \
-                         raw with TOML (.raw), OBJ, glTF, PLY, STL";
+                         raw with TOML (.raw), NumPy (.npy .npz), OpenFOAM cases (folders, .foam), OBJ, glTF, PLY, STL";
 
 /// Number of bytes examined.
 const HEAD_BYTES: u64 = 1024;
@@ -19,15 +20,37 @@ const HEAD_BYTES: u64 = 1024;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Format {
     VtkXml,
+    VtkSeries,
     VtkLegacy,
     Plot3d,
     Nrrd,
     MetaImage,
     Raw,
+    Numpy,
     Obj,
     Gltf,
     Ply,
     Stl,
+}
+
+impl Format {
+    /// Its name, for messages.
+    fn name(self) -> &'static str {
+        match self {
+            Format::VtkXml => vtk_xml::FORMAT,
+            Format::VtkSeries => vtk_xml::series::FORMAT,
+            Format::VtkLegacy => vtk_legacy::FORMAT,
+            Format::Plot3d => plot3d::FORMAT,
+            Format::Nrrd => nrrd::FORMAT,
+            Format::MetaImage => mhd::FORMAT,
+            Format::Raw => raw::FORMAT,
+            Format::Numpy => npy::FORMAT,
+            Format::Obj => obj::FORMAT,
+            Format::Gltf => gltf::FORMAT,
+            Format::Ply => ply::FORMAT,
+            Format::Stl => stl::FORMAT,
+        }
+    }
 }
 
 /// Reads a file of any format that this crate supports. The content decides; for formats without a
@@ -45,7 +68,18 @@ enum Format {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn open(path: impl AsRef<Path>) -> Result<LoadedFile, ReadError> {
+    open_with(path, &OpenOptions::default())
+}
+
+/// As [`open`], with what the file does not say itself, or one of its times.
+///
+/// # Errors
+/// Also if an option means nothing to the format of the file.
+pub fn open_with(path: impl AsRef<Path>, options: &OpenOptions) -> Result<LoadedFile, ReadError> {
     let path = path.as_ref();
+    if openfoam::is_case(path) || path.is_dir() {
+        return openfoam::read(path, options);
+    }
     let mut head = Vec::new();
     let file = std::fs::File::open(path).map_err(|e| io_error(path, e))?;
     let length = file.metadata().map_err(|e| io_error(path, e))?.len();
@@ -64,13 +98,21 @@ pub fn open(path: impl AsRef<Path>) -> Result<LoadedFile, ReadError> {
             }
         }
     };
+    if format != Format::Numpy {
+        options.refuse_lattice().map_err(|f| f.in_file(path, format.name()))?;
+    }
+    if !matches!(format, Format::VtkXml | Format::VtkSeries | Format::Numpy) {
+        options.refuse_time().map_err(|f| f.in_file(path, format.name()))?;
+    }
     let mut opened = match format {
-        Format::VtkXml => vtk_xml::read(path),
+        Format::VtkXml => vtk_xml::read_at(path, options.time),
+        Format::VtkSeries => vtk_xml::series::read(path, options.time),
         Format::VtkLegacy => vtk_legacy::read(path),
         Format::Plot3d => plot3d::read(path, &plot3d::Plot3dOptions::default()),
         Format::Nrrd => nrrd::read(path),
         Format::MetaImage => mhd::read(path),
         Format::Raw => raw::read(path),
+        Format::Numpy => npy::read(path, options),
         Format::Obj => obj::read(path),
         Format::Gltf => gltf::read(path),
         Format::Ply => ply::read(path),
@@ -91,6 +133,10 @@ fn from_content(head: &[u8], length: u64) -> Option<Format> {
         Some(Format::VtkLegacy)
     } else if text.starts_with(b"<") && contains(b"<VTKFile") {
         Some(Format::VtkXml)
+    } else if text.starts_with(b"{") && contains(b"\"file-series-version\"") {
+        Some(Format::VtkSeries)
+    } else if head.starts_with(npy::MAGIC) {
+        Some(Format::Numpy)
     } else if text.starts_with(b"NRRD000") {
         Some(Format::Nrrd)
     } else if text.starts_with(b"ply\n") || text.starts_with(b"ply\r") {
@@ -118,11 +164,13 @@ fn from_name(path: &Path) -> Option<Format> {
     Some(match extension.as_str() {
         "vti" | "vtp" | "vtu" | "vtr" | "vts" | "pvti" | "pvtp" | "pvtu" | "pvtr" | "pvts"
         | "pvd" | "vtm" => Format::VtkXml,
+        "series" => Format::VtkSeries,
         "vtk" => Format::VtkLegacy,
         "xyz" | "x" | "g" | "grid" | "p3d" | "q" | "sol" => Format::Plot3d,
         "nrrd" | "nhdr" => Format::Nrrd,
         "mhd" | "mha" => Format::MetaImage,
         "raw" | "toml" => Format::Raw,
+        "npy" | "npz" => Format::Numpy,
         "obj" => Format::Obj,
         "gltf" | "glb" => Format::Gltf,
         "ply" => Format::Ply,

@@ -110,15 +110,18 @@ pub fn read(path: &Path) -> Result<LoadedFile, ReadError> {
 /// Parses a description in TOML.
 pub(crate) fn parse_description(text: &str) -> Result<RawDescription, Fault> {
     toml::from_str(text).map_err(|e| {
-        let line = e
-            .span()
-            .map_or(0, |s| text[..s.start.min(text.len())].matches('\n').count() as u64 + 1);
         Fault::new(
-            At::Line(line),
+            At::Line(line_of(text, e.span())),
             e.message().to_string(),
             "see the documentation of `read::raw` for the fields",
         )
     })
+}
+
+/// The line in which a span of bytes begins, from 1; 0 without a span.
+pub(crate) fn line_of(text: &str, span: Option<std::ops::Range<usize>>) -> u64 {
+    let before = |s: std::ops::Range<usize>| text.as_bytes().get(..s.start).unwrap_or_default();
+    span.map_or(0, |s| before(s).iter().filter(|b| **b == b'\n').count() as u64 + 1)
 }
 
 fn sibling_description(path: &Path) -> Option<PathBuf> {

@@ -1,7 +1,7 @@
 //! Represents any data set as points and solid cells, numbered consecutively over all blocks.
 //! Lattices keep their implicit cells.
 
-use super::ResampleError;
+use super::{ResampleError, extrude};
 use crate::model::{Attributes, CellType, Dataset, Points, UnstructuredGrid, extent_dims};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -29,7 +29,7 @@ pub struct Mesh {
 struct Part {
     /// Index into [`Dataset::leaves`].
     leaf: usize,
-    /// The axis along which a plane lattice was extruded.
+    /// The axis along which a plane lattice was extruded; any for prisms over polygons.
     extruded: Option<usize>,
     points: Range<usize>,
     cells: Range<usize>,
@@ -48,6 +48,8 @@ enum PartKind {
 struct Explicit {
     /// The cell of the grid for each cell of the part.
     cell: Vec<u32>,
+    /// For prisms over polygons: the polygon of each cell of the grid. Otherwise empty.
+    source: Vec<u32>,
     grid: UnstructuredGrid,
 }
 
@@ -153,13 +155,18 @@ impl Mesh {
             Dataset::StructuredGrid(d) => {
                 self.add_lattice(extent_dims(d.extent), &|i| d.points.get(i), &d.attributes, plane)
             }
+            Dataset::UnstructuredGrid(d) if extrude::has_only_polygons(d) => {
+                self.add_polygons(d, 0, plane)
+            }
             Dataset::UnstructuredGrid(d) => {
                 self.add_cells(d)?;
                 Ok(false)
             }
             Dataset::PolyData(d) => {
-                self.left_out += d.verts.len() + d.lines.len() + d.polys.len() + d.strips.len();
-                Ok(false)
+                let (polygons, first) = extrude::polygons_of(d);
+                let flat = self.add_polygons(&polygons, first as u32, plane)?;
+                self.left_out += d.verts.len() + d.lines.len() + d.strips.len();
+                Ok(flat)
             }
             Dataset::MultiBlock(_) => Ok(false),
         }
@@ -249,7 +256,60 @@ impl Mesh {
             attributes: Attributes::default(),
             ..d.clone()
         };
-        self.push(first, cells, PartKind::Cells(Box::new(Explicit { cell, grid })), &mut hidden)
+        self.push(
+            first,
+            cells,
+            PartKind::Cells(Box::new(Explicit { cell, source: Vec::new(), grid })),
+            &mut hidden,
+        )
+    }
+
+    /// Adds prisms over polygons, which count from `first_cell` on in the arrays of their data set.
+    /// Returns true if the polygons lie in a plane.
+    fn add_polygons(
+        &mut self,
+        d: &UnstructuredGrid,
+        first_cell: u32,
+        plane: Option<Plane>,
+    ) -> Result<bool, ResampleError> {
+        let span = plane.map_or(1.0, |Plane::Extrude { span }| span);
+        let Some(prisms) = extrude::extruded(d, span) else {
+            self.left_out += d.cells.len();
+            return Ok(false);
+        };
+        if plane.is_none() {
+            self.left_out += d.cells.len();
+            return Ok(true);
+        }
+        self.add_cells(&prisms.grid)?;
+        self.left_out += prisms.left_out;
+        // Hidden cells and points are those of the polygons.
+        let ghosts = (d.attributes.cell_array("vtkGhostType"), first_cell as usize);
+        let points = d.attributes.point_array("vtkGhostType");
+        let hidden: Vec<bool> = prisms
+            .source
+            .iter()
+            .map(|&cell| {
+                let hides = |bits: u8, a: &crate::model::DataArray, i: usize| {
+                    i < a.tuples() && a.get(i, 0) as u8 & bits != 0
+                };
+                ghosts.0.is_some_and(|a| hides(HIDDEN_CELL, a, cell as usize + ghosts.1))
+                    || points.is_some_and(|a| {
+                        let mut ids = d.cells.get(cell as usize).iter();
+                        ids.any(|&k| hides(HIDDEN_POINT, a, k as usize))
+                    })
+            })
+            .collect();
+        let Some(part) = self.parts.last_mut() else { return Ok(true) };
+        part.extruded = Some(2);
+        if let PartKind::Cells(e) = &mut part.kind {
+            e.source = prisms.source.iter().map(|c| c + first_cell).collect();
+        }
+        if hidden.iter().any(|h| *h) {
+            self.hidden.resize(part.cells.start, false);
+            self.hidden.extend(hidden);
+        }
+        Ok(true)
     }
 
     fn push(
@@ -396,6 +456,7 @@ impl Mesh {
             out.extend((0..part.points.len()).map(|i| {
                 let source = match (&part.kind, part.extruded) {
                     (PartKind::Lattice(n), Some(axis)) => flat_source(i, *n, axis).0,
+                    (PartKind::Cells(_), Some(_)) => i % (part.points.len() / 2),
                     _ => i,
                 };
                 value(attributes, source)
@@ -414,7 +475,10 @@ impl Mesh {
         self.each_part(data, |part, attributes| {
             out.extend((0..part.cells.len()).map(|i| match &part.kind {
                 PartKind::Lattice(_) => value(attributes, i),
-                PartKind::Cells(e) => value(attributes, e.cell[i] as usize),
+                PartKind::Cells(e) => {
+                    let cell = e.cell[i] as usize;
+                    value(attributes, e.source.get(cell).map_or(cell, |c| *c as usize))
+                }
             }));
         });
         out

@@ -10,6 +10,7 @@
 //! [`Mark`] classifies a node. [`Report`] measures the loss of accuracy by sampling the lattice
 //! back at the points of the mesh.
 
+mod extrude;
 mod mesh;
 mod rasterize;
 mod reconstruct;

@@ -336,10 +336,10 @@ fn plane_data_needs_a_span() {
 
 #[test]
 fn broken_meshes_give_errors_or_counts() {
-    // Surfaces only.
-    let surface = unstructured(&[9], &[&[0, 1, 2, 3]], &CUBE);
+    // Surfaces only; one that lies in a plane could get a depth.
+    let surface = unstructured(&[9, 9], &[&[0, 1, 2, 3], &[0, 1, 5, 4]], &CUBE);
     let text = Mesh::new(&Dataset::UnstructuredGrid(surface)).unwrap_err().to_string();
-    assert!(text.contains("1 cells of other kinds"), "{text}");
+    assert!(text.contains("2 cells of other kinds"), "{text}");
     // A point id that does not exist, too few points, and a good cell.
     let cells: [&[u32]; 3] = [&[0, 1, 2, 99], &[0, 1, 2], &[0, 1, 2, 5]];
     let mesh =

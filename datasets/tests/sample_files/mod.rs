@@ -1,6 +1,8 @@
 //! Small files of every format for the tests of the readers, built byte by byte or by the writers.
 #![allow(dead_code, reason = "each test uses some of them")]
 
+pub(crate) mod openfoam;
+
 use datasets::model::*;
 use datasets::write::{Encoding, VtkOptions, write_vtk};
 use glam::DVec3;
@@ -154,6 +156,42 @@ pub(crate) fn zlib(bytes: &[u8]) -> Vec<u8> {
     let mut z = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::default());
     std::io::Write::write_all(&mut z, bytes).unwrap();
     z.finish().unwrap()
+}
+
+/// An archive of NumPy's: a density over three coordinates, or a spacing with a vector.
+pub(crate) fn npz(packed: bool) -> Vec<u8> {
+    use std::io::Write as _;
+    let array = |shape: &str, values: &[f64]| {
+        let text = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}\n");
+        let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+        bytes.extend((text.len() as u16).to_le_bytes());
+        bytes.extend(text.bytes());
+        values.iter().for_each(|v| bytes.extend(v.to_le_bytes()));
+        bytes
+    };
+    let numbers: Vec<f64> = (0..24).map(f64::from).collect();
+    let arrays = if packed {
+        vec![
+            ("x.npy", array("(3,)", &numbers[..3])),
+            ("y.npy", array("(2,)", &numbers[..2])),
+            ("z.npy", array("(2,)", &numbers[..2])),
+            ("rho.npy", array("(3, 2, 2)", &numbers[..12])),
+        ]
+    } else {
+        vec![
+            ("spacing.npy", array("(3,)", &numbers[1..4])),
+            ("v.npy", array("(2, 2, 2, 3)", &numbers)),
+        ]
+    };
+    let mut archive = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
+    let method =
+        if packed { zip::CompressionMethod::Deflated } else { zip::CompressionMethod::Stored };
+    let options = zip::write::SimpleFileOptions::default().compression_method(method);
+    for (name, bytes) in arrays {
+        archive.start_file(name, options).unwrap();
+        archive.write_all(&bytes).unwrap();
+    }
+    archive.finish().unwrap().into_inner()
 }
 
 pub(crate) fn gzip(bytes: &[u8]) -> Vec<u8> {
@@ -392,6 +430,7 @@ pub(crate) fn all() -> Vec<Sample> {
     for (name, records, big) in [("a.xyz", false, true), ("b.xyz", true, false)] {
         list.push((name, plot3d(&[[3, 2, 2], [2, 2, 2]], true, records, big, true).0));
     }
+    list.extend([("a.npz", npz(true)), ("b.npz", npz(false))]);
     list.push(("c.xyz", b"2 2 1\n0 1 0 1\n0 0 1 1\n0 0 0 0\n".to_vec()));
     list
 }

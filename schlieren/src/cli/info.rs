@@ -37,7 +37,8 @@ fn command(file: &Path, contents: &Contents) -> Option<String> {
     let guess = contents.guess.as_ref()?;
     let mut words = vec!["schlieren".into(), "render".into(), file.display().to_string()];
     for (option, value) in &guess.options {
-        words.extend([(*option).to_owned(), value.clone()]);
+        words.push((*option).to_owned());
+        words.extend(Some(value.clone()).filter(|v| !v.is_empty()));
     }
     words.extend(["-o".into(), "flow.png".into()]);
     Some(words.iter().map(|w| quoted(w)).collect::<Vec<_>>().join(" "))

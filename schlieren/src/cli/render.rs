@@ -14,7 +14,9 @@ use std::time::Instant;
 /// Options of `schlieren render`.
 #[derive(Debug, Args)]
 pub(super) struct RenderArgs {
-    /// The flow: VTK (.vti .vtr .vts .vtu, parallel, .pvd, legacy), PLOT3D, NRRD, MetaImage, raw
+    /// The flow: VTK (.vti .vtr .vts .vtu, parallel, .pvd, .series, legacy), PLOT3D, NRRD,
+    /// MetaImage, NumPy (.npy .npz), raw, a table (.csv), or the folder of an OpenFOAM case or of
+    /// one of its times. Two-dimensional data need --span or --revolve
     file: Option<PathBuf>,
     /// Image as PNG
     #[arg(long, short, value_name = "PNG")]

@@ -3,6 +3,7 @@
 
 use super::{InputError, with_data};
 use datasets::model::{DataArray, Dataset};
+use datasets::read::openfoam::BOUNDARY_PATCHES;
 use datasets::resample::{Mesh, Plane};
 use rt_core::math::median_high;
 use serde::Serialize;
@@ -71,7 +72,7 @@ pub enum Meaning {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Guess {
-    /// Options of the program, each with its value.
+    /// Options of the program, each with its value; a switch has an empty one.
     pub options: Vec<(&'static str, String)>,
     /// Metres per unit of the file.
     pub length_unit_m: f64,
@@ -178,8 +179,16 @@ pub fn contents_of_dataset(data: &Dataset) -> Contents {
             }),
         },
     }
-    c.guess = guess(&mut c);
+    c.guess = guess(&mut c, is_axisymmetric(data));
     c
+}
+
+/// Whether the data are a case of OpenFOAM between patches of type wedge.
+fn is_axisymmetric(data: &Dataset) -> bool {
+    let text = |d: &Dataset| d.attributes().map_or(Vec::new(), |a| a.text.clone());
+    data.leaves().into_iter().flat_map(text).any(|(name, patches)| {
+        name == BOUNDARY_PATCHES && patches.iter().any(|p| p.split(' ').nth(1) == Some("wedge"))
+    })
 }
 
 fn arrays(data: &Dataset) -> Vec<Array> {
@@ -251,7 +260,7 @@ fn meaning(array: &Array) -> Option<Meaning> {
 }
 
 /// Options for the arrays that were recognised.
-fn guess(c: &mut Contents) -> Option<Guess> {
+fn guess(c: &mut Contents, axisymmetric: bool) -> Option<Guess> {
     let size = c.size?;
     let find = |meaning| c.arrays.iter().find(|a| a.meaning == Some(meaning));
     let name = |a: &Array| a.name.clone();
@@ -295,7 +304,9 @@ fn guess(c: &mut Contents) -> Option<Guess> {
              millimetres: check --length-unit"
         ));
     }
-    if c.planar {
+    if c.planar && axisymmetric {
+        options.push(("--revolve", String::new()));
+    } else if c.planar {
         // A round number near half of the longer side.
         let half = 0.5 * longest;
         let unit = 10f64.powf(half.log10().floor());
@@ -339,6 +350,19 @@ mod tests {
         let state = [("T", [200.0, 300.0, 900.0]), ("p", [9e4, 1e5, 2e5])];
         let c = image([5; 3], 0.01, &state);
         assert_eq!(options(&c), [("--temperature", "T".into()), ("--pressure", "p".into())]);
+    }
+
+    #[test]
+    fn a_case_between_wedges_is_revolved() {
+        let options_with = |patch: &str| {
+            let mut image = ImageData::new([5, 5, 1], DVec3::ZERO, DVec3::splat(0.01));
+            let values = (0..25).map(|i| 1.0 + 0.02 * f64::from(i)).collect();
+            image.attributes.point.push(DataArray::new("rho", 1, Values::F64(values)));
+            image.attributes.text.push((BOUNDARY_PATCHES.into(), vec![patch.into()]));
+            options(&contents_of_dataset(&Dataset::ImageData(image)))
+        };
+        assert_eq!(options_with("front wedge 16")[1], ("--revolve", String::new()));
+        assert_eq!(options_with("wedge empty 16")[1].0, "--span");
     }
 
     #[test]

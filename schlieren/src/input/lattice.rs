@@ -207,7 +207,9 @@ fn sheet(data: &Dataset) -> f64 {
             d.coordinates.iter().map(|c| range(&mut c.iter().copied())).fold(0.0, f64::max)
         }
         Dataset::StructuredGrid(d) => range(&mut (0..d.points.len()).map(|i| d.points.get(i).x)),
-        _ => 1.0,
+        Dataset::UnstructuredGrid(d) => range(&mut (0..d.points.len()).map(|i| d.points.get(i).x)),
+        Dataset::PolyData(d) => range(&mut (0..d.points.len()).map(|i| d.points.get(i).x)),
+        Dataset::MultiBlock(_) => 1.0,
     });
     let longest = longest.filter(|x| x.is_finite()).fold(0.0, f64::max);
     if longest > 0.0 { 1e-6 * longest } else { 1.0 }

@@ -1,7 +1,7 @@
-//! Lists the times of a flow, from a PVD collection or a list of files.
+//! Lists the times of a flow: of a collection, a file series, an OpenFOAM case or a list of files.
 
 use super::InputError;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// One time of a series.
 #[derive(Debug, Clone, PartialEq)]
@@ -12,13 +12,14 @@ pub struct Step {
     pub path: PathBuf,
 }
 
-/// Lists the times of a series: those of a single PVD file, or one per file in the given order.
+/// Lists the times of a series: those of a single PVD file, file series (`.vtu.series`) or OpenFOAM
+/// case, or one per file in the given order.
 ///
 /// Comparing them requires the same reference: load the first, then pass its
 /// [`super::Report::reference_n_minus_1`] as [`super::Reference::Given`] to the others.
 pub fn series(paths: &[PathBuf]) -> Result<Vec<Step>, InputError> {
     if let [only] = paths
-        && only.extension().is_some_and(|e| e.eq_ignore_ascii_case("pvd"))
+        && has_times(only)
     {
         let opened = datasets::read::open(only)?;
         if let Some(twice) = opened.time_steps.windows(2).find(|w| w[0].time == w[1].time) {
@@ -33,6 +34,10 @@ pub fn series(paths: &[PathBuf]) -> Result<Vec<Step>, InputError> {
                 }),
             });
         }
+        if opened.time_steps.is_empty() {
+            // A case with a mesh alone.
+            return Ok(vec![Step { time: 0.0, path: only.clone() }]);
+        }
         return Ok(opened
             .time_steps
             .into_iter()
@@ -40,4 +45,11 @@ pub fn series(paths: &[PathBuf]) -> Result<Vec<Step>, InputError> {
             .collect());
     }
     Ok(paths.iter().enumerate().map(|(i, p)| Step { time: i as f64, path: p.clone() }).collect())
+}
+
+/// Whether a path may be that of several times, by its name or as a case of OpenFOAM.
+fn has_times(path: &Path) -> bool {
+    let lists = ["pvd", "series"];
+    path.extension().is_some_and(|e| lists.iter().any(|l| e.eq_ignore_ascii_case(l)))
+        || datasets::read::openfoam::is_whole_case(path)
 }

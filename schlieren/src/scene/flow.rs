@@ -15,7 +15,7 @@ use std::path::PathBuf;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FlowSpec {
-    /// Path of the file (VTI, VTR, VTS, VTU, PLOT3D, NRRD, raw…).
+    /// Path of the file (VTI, VTR, VTS, VTU, PLOT3D, NRRD, NumPy, raw…) or OpenFOAM case.
     pub file: PathBuf,
     /// Density.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -11,10 +11,11 @@ mod file;
 mod parallel;
 mod piece_files;
 pub(crate) mod pieces;
+pub(crate) mod series;
 
 pub use piece_files::{PieceFiles, piece_files};
 
-use super::{Content, LoadedFile, ReadError, TimeStep};
+use super::{Content, LoadedFile, OpenOptions, ReadError, TimeStep};
 use crate::model::Dataset;
 use crate::read::error::{At, Fault, read_bytes};
 use file::{XmlFile, parse_tree, split};
@@ -30,16 +31,26 @@ pub fn read(path: &Path) -> Result<LoadedFile, ReadError> {
     read_nested(path, 0)
 }
 
+/// As [`read`], and of a collection the given time.
+pub fn read_at(path: &Path, time: Option<f64>) -> Result<LoadedFile, ReadError> {
+    from_bytes(path, &read_bytes(path)?, 0, time)
+}
+
 /// Reads one file's content; other files are resolved relative to `path`.
 pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadError> {
-    from_bytes(path, bytes, 0)
+    from_bytes(path, bytes, 0, None)
 }
 
 fn read_nested(path: &Path, depth: usize) -> Result<LoadedFile, ReadError> {
-    from_bytes(path, &read_bytes(path)?, depth)
+    from_bytes(path, &read_bytes(path)?, depth, None)
 }
 
-fn from_bytes(path: &Path, bytes: &[u8], depth: usize) -> Result<LoadedFile, ReadError> {
+fn from_bytes(
+    path: &Path,
+    bytes: &[u8],
+    depth: usize,
+    time: Option<f64>,
+) -> Result<LoadedFile, ReadError> {
     let fault = |f: Fault| f.in_file(path, FORMAT);
     if depth > MAX_NESTING {
         let what = format!("files name each other more than {MAX_NESTING} deep");
@@ -59,6 +70,9 @@ fn from_bytes(path: &Path, bytes: &[u8], depth: usize) -> Result<LoadedFile, Rea
             format!("it has no element `{kind}`, its own type"),
         )));
     };
+    if kind != "Collection" {
+        OpenOptions { time, ..OpenOptions::default() }.refuse_time().map_err(fault)?;
+    }
     let data = if pieces::KINDS.contains(&kind.as_str()) {
         let pieces = pieces::pieces(&file, set, &mut warnings).map_err(fault)?;
         merged(&kind, pieces, &mut warnings).map_err(fault)?
@@ -66,7 +80,7 @@ fn from_bytes(path: &Path, bytes: &[u8], depth: usize) -> Result<LoadedFile, Rea
         parallel::pieces(path, set, serial, depth, &mut warnings)?
     } else if kind == "Collection" {
         steps = parallel::time_steps(path, set).map_err(fault)?;
-        parallel::first_time(path, &steps, depth, &mut warnings)?
+        parallel::at_time(path, &steps, time, depth, &mut warnings)?
     } else if kind == "vtkMultiBlockDataSet"
         || kind == "vtkPartitionedDataSetCollection"
         || kind == "vtkPartitionedDataSet"

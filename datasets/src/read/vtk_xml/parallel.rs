@@ -5,6 +5,7 @@ use super::file::bad_attribute;
 use super::{FORMAT, merged, read_nested};
 use crate::model::{Block, Dataset, extent_dims};
 use crate::read::error::{BROKEN, Fault, sibling_path};
+use crate::read::options::step_at;
 use crate::read::{Content, ReadError, TimeStep};
 use roxmltree::Node;
 use std::path::Path;
@@ -98,15 +99,20 @@ pub(super) fn time_steps(path: &Path, set: Node<'_, '_>) -> Result<Vec<TimeStep>
     Ok(steps)
 }
 
-/// All parts of the first time of a series.
-pub(super) fn first_time(
+/// All parts of one time of a series, by default of the first.
+pub(super) fn at_time(
     path: &Path,
     steps: &[TimeStep],
+    time: Option<f64>,
     depth: usize,
     warnings: &mut Vec<String>,
 ) -> Result<Dataset, ReadError> {
     let Some(first) = steps.first() else {
         return Err(Fault::field("Collection", "it names no files").in_file(path, FORMAT));
+    };
+    let first = match time {
+        Some(t) => step_at(steps, t).map_err(|f| f.in_file(path, FORMAT))?,
+        None => first,
     };
     let mut blocks = Vec::new();
     for step in steps.iter().filter(|s| s.time == first.time) {
@@ -114,11 +120,8 @@ pub(super) fn first_time(
         blocks.push(Block { name: step.part.to_string(), data });
     }
     let times = 1 + steps.windows(2).filter(|w| w[0].time != w[1].time).count();
-    if times > 1 {
-        warnings.push(format!(
-            "a series of {times} times; this is the first, t = {} (see `time_steps`)",
-            first.time
-        ));
+    if times > 1 && time.is_none() {
+        warnings.push(format!("a series of {times} times; this is the first, t = {}", first.time));
     }
     Ok(if blocks.len() == 1 { blocks.remove(0).data } else { Dataset::MultiBlock(blocks) })
 }

@@ -1,0 +1,37 @@
+//! Options about the file to read.
+
+use clap::Args;
+use datasets::read::OpenOptions;
+
+/// What the file does not say itself, or which of its times is meant.
+#[derive(Debug, Clone, Args)]
+pub(super) struct OpenArgs {
+    /// The time to read from a series or an OpenFOAM case [default: the first of a series, the last
+    /// of a case]
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
+    time: Option<f64>,
+    /// Distance between the points of a NumPy array
+    #[arg(long, value_name = "DX,DY,DZ", value_parser = three)]
+    spacing: Option<[f64; 3]>,
+    /// Position of the first point of a NumPy array
+    #[arg(long, value_name = "X,Y,Z", value_parser = three, allow_hyphen_values = true)]
+    origin: Option<[f64; 3]>,
+}
+
+impl OpenArgs {
+    /// Whether a time was asked for.
+    pub(super) fn has_time(&self) -> bool {
+        self.time.is_some()
+    }
+
+    pub(super) fn options(&self) -> OpenOptions {
+        OpenOptions { time: self.time, spacing: self.spacing, origin: self.origin }
+    }
+}
+
+fn three(text: &str) -> Result<[f64; 3], String> {
+    let numbers: Option<Vec<f64>> = text.split(',').map(|n| n.trim().parse().ok()).collect();
+    numbers
+        .and_then(|n| n.try_into().ok())
+        .ok_or_else(|| "give three numbers, such as 0.1,0.1,0.2".into())
+}
