@@ -195,6 +195,12 @@ pub fn load(path: &Path, options: &Options) -> Result<LoadedField, InputError> {
     Ok(loaded)
 }
 
+/// Reads the data of a file into memory, to make several fields of it with [`from_dataset`]; of a
+/// collection, the first time. Also returns the reader's warnings.
+pub fn dataset(path: &Path) -> Result<(Dataset, Vec<String>), InputError> {
+    with_data(path, |data| Ok(data.clone()))
+}
+
 /// Reads a file and converts its data with `make`. Also returns the reader's warnings. Errors name
 /// the file.
 fn with_data<T>(
