@@ -20,7 +20,7 @@ jump = (GAMMA + 1) * (MACH * np.sin(shock)) ** 2
 jump /= (GAMMA - 1) * (MACH * np.sin(shock)) ** 2 + 2
 
 # A grid along the wedge, as a solver has it: 10 cm long, 6 cm high, and 4 cm deep.
-ni, nj, nk = 201, 161, 5
+ni, nj, nk = 121, 97, 3
 i, j, k = np.meshgrid(
     np.linspace(0, 1, ni), np.linspace(0, 1, nj), np.linspace(0, 1, nk), indexing="ij"
 )
@@ -31,7 +31,7 @@ z = 0.04 * k
 
 # The solver spreads the shock over some cells.
 behind = y - x * np.tan(shock)
-density = 1 + (jump - 1) * 0.5 * (1 - np.tanh(behind / 6e-4))
+density = 1 + (jump - 1) * 0.5 * (1 - np.tanh(behind / 1e-3))
 
 # PLOT3D: the numbers of nodes, then x, y, z of all; and density, momentum, energy in a file beside.
 shape = np.array([ni, nj, nk], dtype="<i4")
@@ -46,10 +46,15 @@ with open("wedge.q", "wb") as file:
 
 # From here on a file of yours would do. Its free stream has 0.5 kg/m3.
 field = schlieren.Field.open(
-    "wedge.q", density="Density", density_unit=0.5, resample_nodes=320, outside="solid"
+    "wedge.q",
+    density="Density",
+    density_unit=0.5,
+    resample_nodes=160,
+    outside="solid",
+    reconstruction="linear",
 )
 image = schlieren.render(
-    field, cutoff=schlieren.ColorWheel(radius_m=2e-3), size=(640, 384), tolerance_rad=2e-4
+    field, cutoff=schlieren.ColorWheel(radius_m=2e-3), size=(500, 300), tolerance_rad=2e-4
 )
 largest = image.report.largest_deflection_rad
 print(
@@ -60,7 +65,7 @@ print(
 # Where light is bent most, column by column, lies the shock.
 strength = np.hypot(image.deflection_rad[..., 0], image.deflection_rad[..., 1])
 left, right, bottom, top = image.extent_m
-columns = np.arange(300, 560, 20)
+columns = np.arange(235, 435, 20)
 rows = strength[:, columns].argmax(axis=0)
 up = top - (rows + 0.5) * image.pixel_m
 along = left + (columns + 0.5) * image.pixel_m
