@@ -351,7 +351,14 @@ class Field:
                 f"{lattice.first} has shape {lattice.shape}; give span, the depth of the flow in "
                 "length_unit, or revolve=True for half of an axisymmetric flow"
             )
-        self._set(lattice.dictionary(), meaning)
+        data = lattice.dictionary()
+        unit = meaning.flow.get("length_unit_m", 1.0)
+        for step in data.get("spacing", ()):
+            if not 1e-9 <= step * unit <= 1e9:
+                raise ValueError(
+                    f"spacing is {step * unit} m; give 1e-9 m to 1e9 m, and check length_unit"
+                )
+        self._set(data, meaning)
 
     def _set(self, data, meaning):
         try:

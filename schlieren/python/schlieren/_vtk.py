@@ -82,11 +82,19 @@ def _polyhedra(data, types):
     return {name: np.ascontiguousarray(v, dtype=np.int64) for name, v in as_ids.items()}
 
 
+def _types(data):
+    """Numbers of the cells' types, by the call that this VTK has."""
+    try:
+        return _flat(data.GetCellTypes(), np.uint8)
+    except TypeError:
+        # Before VTK 9.6.
+        return _flat(data.GetCellTypesArray(), np.uint8)
+
+
 def _leaf(data, kind, wanted):
     found = {"kind": kind, "arrays": _attributes(data, wanted)}
     if kind == "UnstructuredGrid":
-        types = _flat(data.GetCellTypesArray(), np.uint8) if data.GetNumberOfCells() else []
-        types = np.asarray(types, dtype=np.uint8)
+        types = _types(data) if data.GetNumberOfCells() else np.zeros(0, dtype=np.uint8)
         cells = data.GetCells()
         found |= {
             "points": _points(data),

@@ -59,21 +59,24 @@ impl Flow {
     }
 
     /// The test section for a scene; the one kept if it is of the same flow and light.
-    fn section(&self, scene: &Scene) -> Result<(String, TestSection), RenderError> {
+    fn section(&self, scene: &Scene) -> PyResult<(String, TestSection)> {
         // Scenes come from JSON, so they can be written as JSON.
         let of = made_for(scene).unwrap_or_default();
         if let Some(mut kept) = self.take_kept().filter(|k| k.of == of) {
-            kept.section.view = scene.view.direction.view(kept.section.fields[0].centre_m())?;
+            let centre_m = kept.section.fields[0].centre_m();
+            kept.section.view = scene.view.direction.view(centre_m).map_err(|e| errors::of(&e))?;
             return Ok((of, kept.section));
         }
         let (solids, more) = match &scene.solids.files[..] {
             [] => (None, Vec::new()),
             files => {
-                let (solids, warnings) = Solids::open(files)?;
+                let opened = Solids::open(files).map_err(RenderError::from);
+                let (solids, warnings) = opened.map_err(|e| errors::of_render(&e))?;
                 (Some(solids), warnings)
             }
         };
-        let mut section = TestSection::of_dataset(scene, &self.data, solids)?.with_caches();
+        let made = TestSection::of_dataset(scene, &self.data, solids);
+        let mut section = made.map_err(|e| errors::of_render(&e))?.with_caches();
         section.warnings.splice(0..0, self.notes.iter().cloned());
         section.warnings.extend(more);
         Ok((of, section))
@@ -127,20 +130,21 @@ impl Flow {
         let scene = scene_of(scene)?;
         let (map, phase, counts, noise) = layers;
         let layers = Layers { map, phase, counts, noise };
-        let work = |stop: &python_work::Stop| -> Result<Output, RenderError> {
+        let work = |stop: &python_work::Stop| -> PyResult<Output> {
             let start = Instant::now();
             let (of, section) = self.section(&scene)?;
             let read_secs = start.elapsed().as_secs_f64();
             let flag = stop.flag();
             let control = Control { cancel: &flag, ..Control::default() };
-            let rendered = render(&scene, &section, layers, &control)?;
+            let rendered = render(&scene, &section, layers, &control);
+            let rendered = rendered.map_err(|e| errors::of_render(&e))?;
             let seconds = [read_secs, start.elapsed().as_secs_f64() - read_secs];
             let input = section.input.clone();
             let dims = section.fields[0].dims();
             self.keep(of, section);
             Ok(Output::new(rendered, scene, input, dims, seconds))
         };
-        run(py, threads, work)?.map_err(|e| errors::of_render(&e))
+        run(py, threads, work)?
     }
 
     /// The ray of one point of the image, as JSON.
@@ -152,13 +156,13 @@ impl Flow {
         threads: usize,
     ) -> PyResult<String> {
         let scene = scene_of(scene)?;
-        let work = |_: &python_work::Stop| {
+        let work = |_: &python_work::Stop| -> PyResult<schlieren::probe::Probe> {
             let (of, section) = self.section(&scene)?;
             let found = schlieren::probe::probe(&scene, &section, pixel);
             self.keep(of, section);
-            found
+            found.map_err(|e| errors::of_render(&e))
         };
-        let found = run(py, threads, work)?.map_err(|e: RenderError| errors::of_render(&e))?;
+        let found = run(py, threads, work)??;
         serde_json::to_string(&found).map_err(|e| errors::of(&e))
     }
 }

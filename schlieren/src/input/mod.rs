@@ -187,8 +187,8 @@ pub struct LoadedField {
     pub report: Report,
 }
 
-/// Largest n − 1 that is taken for a medium's. Far above it, rays turn in every step, and marches do
-/// not end.
+/// Largest n − 1 that is taken for a medium's. Far above it, rays turn in every step, and marches
+/// do not end.
 const MOST_N_MINUS_1: f64 = 100.0;
 
 /// Reads a file as a field. For a time series this reads the first time; see [`series`] for the
