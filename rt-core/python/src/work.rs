@@ -1,15 +1,15 @@
 //! The threads of this package.
 
 use pyo3::prelude::*;
-use python_work::Workers;
-pub(crate) use python_work::{Length, Stop};
+use rt_core_python_work::Workers;
+pub(crate) use rt_core_python_work::{Length, Stop};
 
 static WORKERS: Workers = Workers::new("rt_core");
 
 /// The threads that `threads=None` stands for.
 #[pyfunction]
 pub(crate) fn count_threads() -> usize {
-    python_work::count_threads()
+    rt_core_python_work::count_threads()
 }
 
 /// Runs `work` without the interpreter ([`Workers::run`]).

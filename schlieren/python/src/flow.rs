@@ -130,7 +130,7 @@ impl Flow {
         let scene = scene_of(scene)?;
         let (map, phase, counts, noise) = layers;
         let layers = Layers { map, phase, counts, noise };
-        let work = |stop: &python_work::Stop| -> PyResult<Output> {
+        let work = |stop: &rt_core_python_work::Stop| -> PyResult<Output> {
             let start = Instant::now();
             let (of, section) = self.section(&scene)?;
             let read_secs = start.elapsed().as_secs_f64();
@@ -156,7 +156,7 @@ impl Flow {
         threads: usize,
     ) -> PyResult<String> {
         let scene = scene_of(scene)?;
-        let work = |_: &python_work::Stop| -> PyResult<schlieren::probe::Probe> {
+        let work = |_: &rt_core_python_work::Stop| -> PyResult<schlieren::probe::Probe> {
             let (of, section) = self.section(&scene)?;
             let found = schlieren::probe::probe(&scene, &section, pixel);
             self.keep(of, section);

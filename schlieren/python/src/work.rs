@@ -1,14 +1,14 @@
 //! The threads of this package.
 
 use pyo3::prelude::*;
-use python_work::{Length, Stop, Workers};
+use rt_core_python_work::{Length, Stop, Workers};
 
 static WORKERS: Workers = Workers::new("schlieren");
 
 /// The threads that `threads=None` stands for.
 #[pyfunction]
 pub(crate) fn count_threads() -> usize {
-    python_work::count_threads()
+    rt_core_python_work::count_threads()
 }
 
 /// Runs `work` without the interpreter, while Ctrl-C is looked for ([`Workers::run`]).
