@@ -2,9 +2,9 @@
 //! as a wheel and as a source archive, installed in fresh environments and tested there.
 //!
 //! maturin makes them and checks each wheel against the policy in its `pyproject.toml`, as
-//! auditwheel would: `manylinux_2_34` for rt_core, which is glibc 2.34 or later (Debian 12, Ubuntu 22.04,
-//! RHEL 9), and `manylinux_2_35` for schlieren, whose `hypot` has a new version there. An older one
-//! needs a build on an older system.
+//! auditwheel would: `manylinux_2_34` for rt_core, which is glibc 2.34 or later (Debian 12, Ubuntu
+//! 22.04, RHEL 9), and `manylinux_2_35` for schlieren, whose `hypot` has a new version there. An
+//! older one needs a build on an older system.
 
 use std::fs;
 use std::path::{Path, PathBuf};
