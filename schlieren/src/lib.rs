@@ -61,6 +61,7 @@ pub mod optics;
 pub mod output;
 pub mod path;
 pub mod plan;
+pub mod probe;
 pub mod render;
 pub mod scene;
 #[cfg(feature = "serve")]

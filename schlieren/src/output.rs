@@ -34,9 +34,19 @@ pub enum OutputError {
 
 /// Writes the image as sRGB with 8 bits per channel.
 pub fn write_png(path: &Path, rendered: &RenderOutput) -> Result<PngReport, OutputError> {
+    Ok(image_io::write_png(path, &picture(rendered)?, PngDepth::Eight)?)
+}
+
+/// The bytes of the file that [`write_png`] writes.
+pub fn encode_png(rendered: &RenderOutput) -> Result<(Vec<u8>, PngReport), OutputError> {
+    let name = Path::new("the image");
+    Ok(image_io::encode_png(name, &picture(rendered)?, PngDepth::Eight)?)
+}
+
+fn picture(rendered: &RenderOutput) -> Result<LayeredImage, OutputError> {
     let mut image = LayeredImage::new(rendered.framing.width, rendered.framing.height);
     add_pixels(&mut image, rendered)?;
-    Ok(image_io::write_png(path, &image, PngDepth::Eight)?)
+    Ok(image)
 }
 
 /// Writes every layer that was rendered:

@@ -4,7 +4,7 @@
 //! the machine; [`peers`] finds and installs the third-party software that some tests compare with;
 //! [`licences`] checks what we link against; [`package`] checks what we publish; [`dist`] makes
 //! packages for machines without Rust; [`systems`] runs tests on other releases of Debian;
-//! [`wheels`] makes and tests the Python package.
+//! [`wheels`] makes and tests the Python packages.
 
 mod command;
 mod dist;
@@ -52,9 +52,11 @@ cargo xtask dist [--profile NAME] [--out FOLDER]
       --profile NAME    build with this profile of cargo's instead of `release`
       --out FOLDER      put them there instead of into target/dist
 
-cargo xtask wheels [--profile NAME] [--out FOLDER]
-    Makes the wheel and the source archive of the Python package rt_core, installs the wheel in \
-    fresh environments of every Python of 3.10 or later here, and runs its tests there.
+cargo xtask wheels [--package NAME] [--profile NAME] [--out FOLDER]
+    Makes the wheels and the source archives of the Python packages rt_core and schlieren, installs \
+    the wheels in fresh environments of every Python of 3.10 or later here, and runs their tests \
+    there.
+      --package NAME    only rt_core, or only schlieren
       --profile NAME    build with this profile of cargo's instead of `release`
       --out FOLDER      put them there instead of into target/wheels/dist
 

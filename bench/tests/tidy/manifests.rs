@@ -18,9 +18,11 @@ enum May {
 /// The allowed dependencies of ARCHITECTURE.md. A new line here is a decision; record it there.
 const ALLOWED_DEPENDENCIES: &[(&str, May, &[&str])] = &[
     ("rt-core", May::Use, &[]),
-    ("rt-core-python", May::Use, &["rt-core"]),
+    ("rt-core-python", May::Use, &["rt-core", "rt-core-python-work"]),
+    ("rt-core-python-work", May::Use, &[]),
     ("datasets", May::Use, &["rt-core"]),
     ("schlieren", May::Use, &["rt-core", "datasets"]),
+    ("schlieren-python", May::Use, &["schlieren", "datasets", "rt-core-python-work"]),
     ("composite", May::UseBehindAFeature, &["rt-core", "datasets"]),
     ("gluray", May::Use, &["rt-core", "composite", "datasets"]),
     // For the tests alone: they run programs with the shared library.

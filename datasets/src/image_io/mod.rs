@@ -21,7 +21,7 @@ mod openexr;
 mod png;
 
 pub use openexr::{read_exr, write_exr};
-pub use png::{PngDepth, PngReport, read_png, write_png};
+pub use png::{PngDepth, PngReport, encode_png, read_png, write_png};
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -34,9 +34,20 @@ pub fn write_png(
     image: &LayeredImage,
     depth: PngDepth,
 ) -> Result<PngReport, ImageError> {
+    let (bytes, report) = encode_png(path, image, depth)?;
+    write_atomically(path, |w| w.write_all(&bytes)).map_err(io_error(path, "write"))?;
+    Ok(report)
+}
+
+/// The bytes of the file that [`write_png`] writes. `name` stands for it in errors.
+pub fn encode_png(
+    name: &Path,
+    image: &LayeredImage,
+    depth: PngDepth,
+) -> Result<(Vec<u8>, PngReport), ImageError> {
     let pixels = image.rgba()?;
     if pixels.is_empty() {
-        return Err(format_error(path, "PNG cannot hold an image without pixels"));
+        return Err(format_error(name, "PNG cannot hold an image without pixels"));
     }
     let mut report = PngReport::default();
     let encoded: Vec<[f32; 4]> = pixels.iter().map(|&p| encode(p, &mut report)).collect();
@@ -65,9 +76,8 @@ pub fn write_png(
     let mut file = Cursor::new(Vec::new());
     image::codecs::png::PngEncoder::new(&mut file)
         .write_image(&bytes, image.width, image.height, color)
-        .map_err(|e| format_error(path, e))?;
-    write_atomically(path, |w| w.write_all(file.get_ref())).map_err(io_error(path, "write"))?;
-    Ok(report)
+        .map_err(|e| format_error(name, e))?;
+    Ok((file.into_inner(), report))
 }
 
 /// Reads a PNG of any kind as linear premultiplied R, G, B (and A when the file has alpha).

@@ -1,146 +1,23 @@
-//! Runs work on a pool of threads while the interpreter does something else.
+//! The threads of this package.
 
-use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
-use rayon::{ThreadPool, ThreadPoolBuilder};
-use std::any::Any;
-use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Condvar, Mutex, PoisonError};
-use std::time::Duration;
+use rt_core_python_work::Workers;
+pub(crate) use rt_core_python_work::{Length, Stop};
 
-/// Most threads that a call may ask for: each size of pool that was used stays.
-const MOST_THREADS: usize = 1024;
-/// Time between two looks for Ctrl-C.
-const BETWEEN_SIGNALS: Duration = Duration::from_millis(30);
-
-/// The pools of this process, by their number of threads.
-struct Pools {
-    process: u32,
-    pools: Vec<(usize, Arc<ThreadPool>)>,
-}
-
-/// Locked only by who holds the interpreter. `os.fork` holds it too, so no child begins with the
-/// lock taken.
-static POOLS: Mutex<Pools> = Mutex::new(Pools { process: 0, pools: Vec::new() });
+static WORKERS: Workers = Workers::new("rt_core");
 
 /// The threads that `threads=None` stands for.
 #[pyfunction]
 pub(crate) fn count_threads() -> usize {
-    std::thread::available_parallelism().map_or(1, usize::from)
+    rt_core_python_work::count_threads()
 }
 
-/// A pool of `threads` threads; of as many as the machine has for 0.
-fn pool(_py: Python<'_>, threads: usize) -> PyResult<Arc<ThreadPool>> {
-    let threads = if threads == 0 { count_threads() } else { threads };
-    if threads > MOST_THREADS {
-        return Err(PyValueError::new_err(format!(
-            "threads is {threads}; give 1 to {MOST_THREADS}, or None for all of this machine"
-        )));
-    }
-    let mut all = POOLS.lock().unwrap_or_else(PoisonError::into_inner);
-    if all.process != std::process::id() {
-        // After a fork the threads of the parent's pools do not exist here. To drop a pool would
-        // wait for them.
-        std::mem::forget(std::mem::take(&mut all.pools));
-        all.process = std::process::id();
-    }
-    if let Some((_, pool)) = all.pools.iter().find(|(n, _)| *n == threads) {
-        return Ok(Arc::clone(pool));
-    }
-    let name = |i| format!("rt_core-{i}");
-    let pool = ThreadPoolBuilder::new().num_threads(threads).thread_name(name).build();
-    let pool = Arc::new(pool.map_err(|e| {
-        PyRuntimeError::new_err(format!("threads is {threads}: {e}; ask for fewer"))
-    })?);
-    all.pools.push((threads, Arc::clone(&pool)));
-    Ok(pool)
-}
-
-/// Tells work whether to stop early.
-#[derive(Default)]
-pub(crate) struct Stop(Arc<AtomicBool>);
-
-impl Stop {
-    pub(crate) fn is_asked(&self) -> bool {
-        self.0.load(Ordering::Relaxed)
-    }
-
-    /// The same, for who looks at it by themselves.
-    pub(crate) fn flag(&self) -> Arc<AtomicBool> {
-        Arc::clone(&self.0)
-    }
-}
-
-/// How long a call may take.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Length {
-    /// A blink: Ctrl-C is looked for after it.
-    Short,
-    /// Longer: Ctrl-C is looked for meanwhile, on a thread of its own.
-    Long,
-}
-
-/// Runs `work` on `threads` threads (0: all) without the interpreter. Ctrl-C asks `work` to stop,
-/// and its result is then lost. A panic becomes a `RuntimeError`.
+/// Runs `work` without the interpreter ([`Workers::run`]).
 pub(crate) fn run<R: Send>(
     py: Python<'_>,
     threads: usize,
     length: Length,
     work: impl FnOnce(&Stop) -> R + Send,
 ) -> PyResult<R> {
-    let pool = pool(py, threads)?;
-    let stop = Stop::default();
-    let guarded = || catch_unwind(AssertUnwindSafe(|| pool.install(|| work(&stop))));
-    let result = match length {
-        Length::Short => py.detach(guarded),
-        Length::Long => watched(py, &stop, guarded)?,
-    };
-    py.check_signals()?;
-    result.map_err(|panic| {
-        PyRuntimeError::new_err(format!(
-            "a defect of rt_core, please report it with your input: {}",
-            text_of(&*panic)
-        ))
-    })
-}
-
-/// Runs `work` on another thread, while this one looks for Ctrl-C.
-fn watched<R: Send>(py: Python<'_>, stop: &Stop, work: impl FnOnce() -> R + Send) -> PyResult<R> {
-    let ended = (Mutex::new(false), Condvar::new());
-    std::thread::scope(|scope| {
-        let worker = scope.spawn(|| {
-            let result = work();
-            *ended.0.lock().unwrap_or_else(PoisonError::into_inner) = true;
-            ended.1.notify_all();
-            result
-        });
-        let mut interrupted = None;
-        while !py.detach(|| wait(&ended)) {
-            if interrupted.is_none()
-                && let Err(error) = py.check_signals()
-            {
-                stop.0.store(true, Ordering::Relaxed);
-                interrupted = Some(error);
-            }
-        }
-        let result = py.detach(|| worker.join());
-        match (interrupted, result) {
-            (Some(error), _) => Err(error),
-            (None, Ok(result)) => Ok(result),
-            (None, Err(panic)) => Err(PyRuntimeError::new_err(text_of(&*panic).to_owned())),
-        }
-    })
-}
-
-/// Waits until the work has ended, but not for long; whether it has.
-fn wait((ended, changed): &(Mutex<bool>, Condvar)) -> bool {
-    let guard = ended.lock().unwrap_or_else(PoisonError::into_inner);
-    let waited = changed.wait_timeout_while(guard, BETWEEN_SIGNALS, |ended| !*ended);
-    *waited.unwrap_or_else(PoisonError::into_inner).0
-}
-
-fn text_of(panic: &(dyn Any + Send)) -> &str {
-    let owned = panic.downcast_ref::<String>().map(String::as_str);
-    owned.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("no message")
+    WORKERS.run(py, threads, length, work)
 }

@@ -187,12 +187,22 @@ pub struct LoadedField {
     pub report: Report,
 }
 
+/// Largest n − 1 that is taken for a medium's. Far above it, rays turn in every step, and marches
+/// do not end.
+const MOST_N_MINUS_1: f64 = 100.0;
+
 /// Reads a file as a field. For a time series this reads the first time; see [`series`] for the
 /// others.
 pub fn load(path: &Path, options: &Options) -> Result<LoadedField, InputError> {
     let (mut loaded, warnings) = with_data(path, |data| from_dataset(data, options))?;
     loaded.report.warnings.splice(0..0, warnings);
     Ok(loaded)
+}
+
+/// Reads the data of a file into memory, to make several fields of it with [`from_dataset`]; of a
+/// collection, the first time. Also returns the reader's warnings.
+pub fn dataset(path: &Path) -> Result<(Dataset, Vec<String>), InputError> {
+    with_data(path, |data| Ok(data.clone()))
 }
 
 /// Reads a file and converts its data with `make`. Also returns the reader's warnings. Errors name
@@ -246,6 +256,13 @@ pub fn from_dataset(data: &Dataset, options: &Options) -> Result<LoadedField, In
     let points = lattice::SamplePoints::find(data, options)?;
     let columns = options.medium.columns(data, &points)?;
     let mut index = evaluate::evaluate(&columns, options, &mut report)?;
+    let largest = report.n_minus_1_range[1];
+    if largest > MOST_N_MINUS_1 {
+        return Err(InputError::Option {
+            what: format!("n - 1 is up to {largest:.3e}, and no medium has that"),
+            cure: "check the units of the arrays",
+        });
+    }
     let background = reference::median(&index);
     if !background.is_finite() {
         return Err(InputError::Option {

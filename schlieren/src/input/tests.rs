@@ -440,3 +440,10 @@ fn no_error_repeats_its_cause() {
         assert_eq!(chain(&crate::render::RenderError::from(error)), texts);
     }
 }
+
+#[test]
+fn an_index_that_no_medium_has_is_refused_and_does_not_trace_for_ever() {
+    let data = image([4; 3], vec![("rho", true, ramp(64, 1e30, 1e29))]);
+    let refused = from_dataset(&data, &Options::new(Medium::density("rho"))).unwrap_err();
+    assert!(refused.to_string().contains("no medium has that"), "{refused}");
+}

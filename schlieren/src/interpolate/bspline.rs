@@ -29,6 +29,7 @@ impl BSpline {
     /// [`BSpline::new`] on the calling thread alone, with the same result bit for bit. Callers that
     /// hold a lock need this: a worker that waits inside rayon may take any other job, also one
     /// that waits for the same lock.
+    #[cfg(feature = "gpu")]
     pub(crate) fn on_this_thread(field: &Field) -> BSpline {
         // Rayon does not divide ranges that are shorter than this minimum, and an undivided range
         // runs on the calling thread.

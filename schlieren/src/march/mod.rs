@@ -38,7 +38,8 @@ pub(crate) use frame::Frame;
 pub use full::{Full, FullOptions};
 pub use integrator::{Integrator, InterpolatedMedium, Medium, Ray};
 #[cfg(feature = "gpu")]
-pub(crate) use kernel_ray::{KernelOutput, KernelRay};
+pub(crate) use kernel_ray::KernelOutput;
+pub(crate) use kernel_ray::KernelRay;
 pub use line_of_sight::LineOfSight;
 pub use pefrl::Pefrl;
 pub use rk4::RungeKutta4;

@@ -1,7 +1,9 @@
 //! Plans light paths on the GPU, or gives the reason why the CPU computes them.
 
 use super::RenderError;
-use super::planned::{PlannedPaths, described};
+use super::planned::PlannedPaths;
+#[cfg(feature = "gpu")]
+use super::planned::described;
 use crate::field::Field;
 use crate::march::FieldCache;
 use crate::plan::Request;

@@ -9,6 +9,7 @@ use crate::media::Media;
 use crate::scene::Scene;
 use crate::solids::Solids;
 use crate::view::View;
+use datasets::model::Dataset;
 
 /// The contents of the test section, between the lenses.
 pub struct TestSection {
@@ -58,6 +59,35 @@ impl TestSection {
             let options = scene.flow.options(scene.light.wavelengths_nm[0])?;
             let (file, field) = (&scene.flow.file, &section.fields[0]);
             let media = input::load_media(file, &options, &scene.media.quantities(), field)?;
+            section = section.with_media(media);
+        }
+        Ok(section)
+    }
+
+    /// A test section of a data set in memory. The scene's `flow` gives its arrays their meaning;
+    /// the file that it names is not read.
+    ///
+    /// # Errors
+    /// If the data set does not define a field for each wavelength, or what the scene's `media`
+    /// names.
+    pub fn of_dataset(
+        scene: &Scene,
+        data: &Dataset,
+        solids: Option<Solids>,
+    ) -> Result<TestSection, RenderError> {
+        let (mut fields, mut report) = (Vec::new(), None::<input::Report>);
+        for line in scene.lines() {
+            let loaded = input::from_dataset(data, &scene.flow.options(line.wavelength_nm)?)?;
+            fields.push(loaded.field);
+            report.get_or_insert(loaded.report);
+        }
+        let mut section = TestSection::of_fields(scene, fields, solids)?;
+        section.warnings = report.as_ref().map_or(Vec::new(), |r| r.warnings.clone());
+        section.input = report;
+        if !scene.media.is_empty() {
+            let options = scene.flow.options(scene.light.wavelengths_nm[0])?;
+            let quantities = scene.media.quantities();
+            let media = input::media_from_dataset(data, &options, &quantities, &section.fields[0])?;
             section = section.with_media(media);
         }
         Ok(section)

@@ -32,15 +32,8 @@ impl Flow {
     /// Reads a file; of a collection, the first time.
     pub(super) fn open(path: &Path) -> Result<Flow, InputError> {
         let file = path.to_path_buf();
-        let in_file =
-            |e: InputError| InputError::InFile { path: file.clone(), source: Box::new(e) };
-        if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv")) {
-            let data = datasets::read::csv_lattice::dataset(&datasets::read::csv::read(path)?)?;
-            return Ok(Flow { file, data, warnings: Vec::new() });
-        }
-        let opened = datasets::read::open(path)?;
-        let data = opened.dataset().map_err(|e| in_file(e.into()))?.clone();
-        Ok(Flow { data, warnings: opened.warnings, file })
+        let (data, warnings) = crate::input::dataset(path)?;
+        Ok(Flow { data, warnings, file })
     }
 
     /// Arrays of points and cells that are not constant, sorted by name.

@@ -177,6 +177,8 @@ def _functions(library, path):
         raise RtvError(f"{path} has interface {found}, this package needs {ABI}: install the package that belongs to the library")
     return dict(
         new=bind("rtv_new", p), free=bind("rtv_free", None, p), option=bind("rtv_bridge_option", C.c_double, p, text),
+        set_process_option=bind("rtv_set_option", C.c_int32, text, text),
+        set_option=bind("rtv_set_bridge_option", C.c_int32, p, text, text),
         host=bind("rtv_host", None, C.c_uint32, C.c_uint32, C.c_uint32), begin=bind("rtv_begin", C.c_int32, p),
         surfaces=bind("rtv_surfaces", C.c_int32, p, C.POINTER(Surface), C.c_uint64),
         has_colors=bind("rtv_has_colors", C.c_int32, p, C.c_uint64, C.c_uint64),
@@ -219,6 +221,6 @@ class Bridge:
         if name.startswith("_"):
             raise AttributeError(name)
         function = Bridge._calls[name]
-        if name in ("warn", "pass_on", "option"):
-            return lambda *texts: function(self._handle, *(t and t.encode() for t in texts))
+        if name in ("warn", "pass_on", "option", "set_option"):
+            return lambda *texts: function(self._handle, *(None if t is None else t.encode() for t in texts))
         return lambda *arguments: function(self._handle, *arguments)

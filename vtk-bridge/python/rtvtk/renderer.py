@@ -39,6 +39,11 @@ class _Watched:
         found = thing.GetCommand(tag) if weak.Get() is not None else None
         return value if found is not None and found.__this__ == command.__this__ else None
 
+    def things(self):
+        """The objects that exist and are observed."""
+        found = [entry[0].Get() for entry in list(self._entries.values())]
+        return [thing for thing in found if thing is not None and self.get(thing) is not None]
+
     def add(self, thing, observe, value):
         for address in [a for a, entry in self._entries.items() if entry[0].Get() is None]:
             del self._entries[address]
@@ -150,6 +155,33 @@ class _Tracer:
         for name in self.switched:
             getattr(renderer, f"Set{name}")(True)
         self.hidden, self.shown, self.switched = [], [], []
+
+
+def renderers_of(plotter):
+    """The renderers of a renderer, a window, or a plotter of PyVista."""
+    for name in ("render_window", "ren_win"):
+        window = getattr(plotter, name, None)
+        if window is not None:
+            plotter = window
+            break
+    if not hasattr(plotter, "IsA"):
+        return []
+    if plotter.IsA("vtkRenderer"):
+        return [plotter]
+    if not plotter.IsA("vtkRenderWindow"):
+        return []
+    renderers = plotter.GetRenderers()
+    return [renderers.GetItemAsObject(i) for i in range(renderers.GetNumberOfItems())]
+
+
+def tracer_of(renderer):
+    """What traces a renderer, or None."""
+    return _renderers.get(renderer)
+
+
+def traced_renderers():
+    """All renderers that trace."""
+    return _renderers.things()
 
 
 def attach(renderer):
