@@ -1,6 +1,7 @@
 //! The hierarchy over a mesh's triangles.
 
 use super::build::{MAX_PRIMS, PrimRef, Progress, Stopped, build_wide};
+use super::compact;
 use super::layout::local_frame::LocalFrame;
 use super::layout::triangles::TriWriter;
 use super::layout::wide::WideBvh;
@@ -63,6 +64,9 @@ pub(crate) fn closest<S: Simd, T: TriangleTest>(
     tree: &TreeView<'_>,
     ray: &Ray,
 ) -> ClosestTri {
+    if tree.meshlets() != 0 {
+        return compact::closest::<S, T>(simd, tree, ray);
+    }
     simd.vectorize(
         #[inline(always)]
         || {
@@ -77,6 +81,9 @@ pub(crate) fn closest<S: Simd, T: TriangleTest>(
 /// Whether anything blocks a local-space ray.
 #[inline(never)]
 pub(crate) fn occluded<S: Simd, T: TriangleTest>(simd: S, tree: &TreeView<'_>, ray: &Ray) -> bool {
+    if tree.meshlets() != 0 {
+        return compact::occluded::<S, T>(simd, tree, ray);
+    }
     simd.vectorize(
         #[inline(always)]
         || {

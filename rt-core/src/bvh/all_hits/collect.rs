@@ -2,6 +2,7 @@
 
 use crate::bvh::Unit;
 use crate::bvh::blas::{Content, leaf_primitive_ids};
+use crate::bvh::compact;
 use crate::bvh::entry::Entry;
 use crate::bvh::instance_filter::InstanceFilter;
 use crate::bvh::intersect::crossing::crosses;
@@ -71,6 +72,11 @@ impl<'w, F: FnMut(Hit) -> bool> Crossings<'w, F> {
                         let mut leaves = TriangleCrossings { ray: &setup, t_max: ray.t_max, found };
                         let tree = TreeView::all(&tris.bvh);
                         traverse(simd, &tree, &setup, ray.t_max, &mut leaves);
+                    }
+                    Content::Compact(tree) => {
+                        let leaves = TriangleCrossings { ray: &setup, t_max: ray.t_max, found };
+                        let tree = TreeView::of_meshlets(tree);
+                        compact::search(simd, &tree, &setup, ray.t_max, leaves);
                     }
                     Content::Shape { bvh, shape } => {
                         let mut leaves = ShapeCrossings { shape: &**shape, ray, found };

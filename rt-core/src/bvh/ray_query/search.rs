@@ -4,6 +4,7 @@
 use super::Accept;
 use crate::bvh::Unit;
 use crate::bvh::blas::{Content, leaf_primitive_ids};
+use crate::bvh::compact;
 use crate::bvh::entry::Entry;
 use crate::bvh::instance_filter::InstanceFilter;
 use crate::bvh::layout::triangles::{leaf_floats, leaf_triangle_ids};
@@ -104,8 +105,12 @@ impl<'w, T: TriangleTest> AcceptedHits<'w, T> {
                     accepts: &accepts,
                     test: PhantomData,
                 };
-                traverse(simd, &tree, &setup, ray.t_max, &mut leaves);
-                leaves.best
+                if tree.meshlets() != 0 {
+                    compact::search(simd, &tree, &setup, ray.t_max, leaves).best
+                } else {
+                    traverse(simd, &tree, &setup, ray.t_max, &mut leaves);
+                    leaves.best
+                }
             }
             (None, Entry::Instance { blas, .. }) => {
                 let Content::Shape { bvh, shape } = &blas.content else { return };

@@ -3,6 +3,7 @@
 use super::tree_view::TreeView;
 use super::{hybrid, scattered};
 use crate::bvh::Unit;
+use crate::bvh::compact::trace_blocks;
 use crate::bvh::layout::wide::NODE_UNITS;
 use crate::bvh::query::{HitQuery, TriangleTest};
 use crate::bvh::traverse::packet::GROUPS;
@@ -36,6 +37,10 @@ pub(crate) fn trace<S: Simd, T: TriangleTest, Q: HitQuery>(
     hits: &mut [HitBlock],
     instance: u32,
 ) {
+    if tree.meshlets() != 0 {
+        trace_blocks::<S, T, Q>(simd, tree, rays, hits, instance);
+        return;
+    }
     for (rays, hits) in rays.chunks(GROUPS).zip(hits.chunks_mut(GROUPS)) {
         let mut choices = CHOICES.get();
         let choice = &mut choices[Q::ANY as usize];
