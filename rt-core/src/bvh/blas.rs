@@ -8,9 +8,10 @@
 
 use super::build::{PrimRef, Progress, Stopped, build_wide};
 use super::compact::CompactBvh;
+use super::layout::id_leaf::{IdWriter, leaf_primitive_ids};
 use super::layout::local_frame::LocalFrame;
 use super::layout::triangles::widened;
-use super::layout::wide::{ChildRef, LeafWriter, Unit, WideBvh, write_id_leaf};
+use super::layout::wide::{ChildRef, Unit, WideBvh};
 use super::options::{BuildOptions, Storage};
 use super::query::{AnyHit, ClosestHit, TriangleTest};
 use super::traverse::tree_view::TreeView;
@@ -54,21 +55,6 @@ pub(crate) struct Blas {
     pub(crate) cost_growth: f64,
     /// For [`super::BuildReport::notes`].
     pub(crate) notes: Vec<String>,
-}
-
-pub(crate) struct IdWriter;
-
-impl LeafWriter for IdWriter {
-    const UNITS: usize = 1;
-    fn write(&self, prims: &[u32], out: &mut [Unit]) {
-        write_id_leaf(out, prims.iter().copied());
-    }
-}
-
-/// The numbers in an id leaf.
-#[inline(always)]
-pub(crate) fn leaf_primitive_ids(units: &[Unit], leaf: ChildRef) -> &[u32] {
-    &units[leaf.unit()].bits()[..leaf.count()]
 }
 
 impl Blas {

@@ -1,12 +1,12 @@
 //! The hierarchy over a mesh's triangles.
 
 use super::build::{MAX_PRIMS, PrimRef, Progress, Stopped, build_wide};
-use super::compact;
 use super::layout::local_frame::LocalFrame;
 use super::layout::triangles::TriWriter;
 use super::layout::wide::WideBvh;
 use super::options::BuildQuality;
 use super::query::TriangleTest;
+use super::traverse::meshlets;
 use super::traverse::single::{RaySetup, traverse_body};
 use super::traverse::tree_view::TreeView;
 use super::traverse::triangle_leaf::{AnyLeaf, ClosestLeaf, ClosestTri};
@@ -65,7 +65,7 @@ pub(crate) fn closest<S: Simd, T: TriangleTest>(
     ray: &Ray,
 ) -> ClosestTri {
     if tree.meshlets() != 0 {
-        return compact::closest::<S, T>(simd, tree, ray);
+        return meshlets::closest::<S, T>(simd, tree, ray);
     }
     simd.vectorize(
         #[inline(always)]
@@ -82,7 +82,7 @@ pub(crate) fn closest<S: Simd, T: TriangleTest>(
 #[inline(never)]
 pub(crate) fn occluded<S: Simd, T: TriangleTest>(simd: S, tree: &TreeView<'_>, ray: &Ray) -> bool {
     if tree.meshlets() != 0 {
-        return compact::occluded::<S, T>(simd, tree, ray);
+        return meshlets::occluded::<S, T>(simd, tree, ray);
     }
     simd.vectorize(
         #[inline(always)]

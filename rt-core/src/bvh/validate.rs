@@ -1,7 +1,10 @@
 //! Checks finished trees, for tests and debugging: slow, and not needed by correct programs.
 
-use super::blas::{Blas, Content, leaf_primitive_ids};
+mod meshlets;
+
+use super::blas::{Blas, Content};
 use super::geometry::Geometry;
+use super::layout::id_leaf::leaf_primitive_ids;
 use super::layout::local_frame::LocalFrame;
 use super::layout::triangles::{
     TRI_LEAF_UNITS, TriWriter, leaf_floats, leaf_triangle_ids, row, widened,

@@ -24,8 +24,8 @@ pub(crate) fn all_options() -> Vec<BuildOptions> {
     all
 }
 
-/// Every preset, robustness mode and storage, each at one instruction set in turn. Enough where only the
-/// tree matters.
+/// Every preset, robustness mode and storage, each at one instruction set in turn: enough where
+/// only the tree matters.
 pub(crate) fn some_options() -> Vec<BuildOptions> {
     let levels = SimdLevel::available();
     let modes = Robustness::ALL.iter().flat_map(|&r| BuildQuality::ALL.map(|q| (q, r)));

@@ -44,7 +44,7 @@ fn all_hits_and_closest_points_of_compact_trees_are_those_of_plain_ones() {
             };
             assert_eq!(of(&plain), of(&compact), "{name}: {ray:?}");
             let even = |w: &World| {
-                let accept = |h: &rt_core::ray::Hit| h.prim % 2 == 0;
+                let accept = |h: &rt_core::ray::Hit| h.prim.is_multiple_of(2);
                 bits(w.query().accepting(&accept).closest(&ray))
             };
             assert_eq!(even(&plain), even(&compact), "{name}: {ray:?}");

@@ -1,14 +1,15 @@
 //! Visits every leaf that a ray reaches, in the upper level and in the entries' trees.
 
 use crate::bvh::Unit;
-use crate::bvh::blas::{Content, leaf_primitive_ids};
-use crate::bvh::compact;
+use crate::bvh::blas::Content;
 use crate::bvh::entry::Entry;
 use crate::bvh::instance_filter::InstanceFilter;
 use crate::bvh::intersect::crossing::crosses;
+use crate::bvh::layout::id_leaf::leaf_primitive_ids;
 use crate::bvh::layout::triangles::{leaf_floats, leaf_triangle_ids, row};
 use crate::bvh::layout::wide::ChildRef;
 use crate::bvh::query::{AnyHit, WatertightTest};
+use crate::bvh::traverse::meshlets;
 use crate::bvh::traverse::single::{LeafTest, RaySetup, traverse};
 use crate::bvh::traverse::tree_view::TreeView;
 use crate::bvh::traverse::triangle_leaf::test_leaf;
@@ -76,7 +77,7 @@ impl<'w, F: FnMut(Hit) -> bool> Crossings<'w, F> {
                     Content::Compact(tree) => {
                         let leaves = TriangleCrossings { ray: &setup, t_max: ray.t_max, found };
                         let tree = TreeView::of_meshlets(tree);
-                        compact::search(simd, &tree, &setup, ray.t_max, leaves);
+                        meshlets::search(simd, &tree, &setup, ray.t_max, leaves);
                     }
                     Content::Shape { bvh, shape } => {
                         let mut leaves = ShapeCrossings { shape: &**shape, ray, found };

@@ -1,8 +1,8 @@
 //! Builds compact trees: piece by piece, meshlets first, the nodes above them last.
 //!
 //! ```text
-//! triangles ─ divide ─► pieces ─ build_wide ─► trees of numbers ─ cut ─► parts ─ encode ─► meshlets
-//!                                                       meshlets' boxes ─ build_wide ─► nodes above
+//! triangles ─ divide ─► pieces ─ build_wide ─► trees of numbers ─ cut ─► parts
+//! parts ─ encode ─► meshlets;   their boxes ─ build_wide ─► nodes above
 //! ```
 
 use super::CompactBvh;
@@ -10,8 +10,8 @@ use super::cache::new_key;
 use super::cut::{Part, parts};
 use super::meshlet::{Encoder, one_to_a_leaf};
 use super::pieces::divide;
-use crate::bvh::blas::IdWriter;
 use crate::bvh::build::{PrimRef, Progress, Stopped, build_wide};
+use crate::bvh::layout::id_leaf::IdWriter;
 use crate::bvh::layout::local_frame::LocalFrame;
 use crate::bvh::layout::triangles::TriWriter;
 use crate::bvh::layout::wide::{

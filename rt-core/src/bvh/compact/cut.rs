@@ -1,12 +1,15 @@
 //! Cuts the tree of a piece of a mesh into parts that become meshlets.
 
-use super::meshlet::{MAX_LEAVES, MAX_TRIANGLES};
-use crate::bvh::blas::leaf_primitive_ids;
+use crate::bvh::layout::id_leaf::leaf_primitive_ids;
 use crate::bvh::layout::wide::{
     CHILD_ROW, ChildRef, LEAF_SIZE, NODE_UNITS, WIDTH, WideBvh, get_box,
 };
 use crate::math::Aabb;
 
+/// Most triangles of a meshlet.
+pub(super) const MAX_TRIANGLES: usize = 64;
+/// Most leaves: more than 64 triangles fill, fewer than they may need one by one.
+pub(super) const MAX_LEAVES: usize = 24;
 /// Parts with fewer triangles wait for company from further up in the tree.
 const SMALL: usize = 24;
 

@@ -4,7 +4,8 @@
 use super::bits;
 use super::boxes::plane;
 use super::coordinates::Coordinates;
-use super::meshlet::{HEADER_WORDS, Header, MAX_LEAVES, MAX_NODES, NODE, NONE};
+use super::cut::MAX_LEAVES;
+use super::meshlet::{HEADER_WORDS, Header, MAX_NODES, NODE, NONE};
 use crate::bvh::layout::triangles::TRI_LEAF_UNITS;
 use crate::bvh::layout::wide::{CHILD_ROW, ChildRef, LEAF_SIZE, NODE_UNITS, Unit, WIDTH};
 use fearless_simd::Simd;

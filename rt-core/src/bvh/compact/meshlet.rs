@@ -29,10 +29,6 @@ use crate::bvh::options::BuildQuality;
 use crate::math::Aabb;
 use std::collections::VecDeque;
 
-/// Most triangles of a meshlet.
-pub(super) const MAX_TRIANGLES: usize = 64;
-/// Most leaves: more than 64 triangles fill, fewer than they may need one by one.
-pub(super) const MAX_LEAVES: usize = 24;
 /// Most nodes of the small tree.
 pub(super) const MAX_NODES: usize = 9;
 /// Words before the nodes.

@@ -1,9 +1,8 @@
 //! Traces blocks of rays in any direction through a triangle hierarchy.
 
 use super::tree_view::TreeView;
-use super::{hybrid, scattered};
+use super::{hybrid, meshlets, scattered};
 use crate::bvh::Unit;
-use crate::bvh::compact::trace_blocks;
 use crate::bvh::layout::wide::NODE_UNITS;
 use crate::bvh::query::{HitQuery, TriangleTest};
 use crate::bvh::traverse::packet::GROUPS;
@@ -38,7 +37,7 @@ pub(crate) fn trace<S: Simd, T: TriangleTest, Q: HitQuery>(
     instance: u32,
 ) {
     if tree.meshlets() != 0 {
-        trace_blocks::<S, T, Q>(simd, tree, rays, hits, instance);
+        meshlets::trace_blocks::<S, T, Q>(simd, tree, rays, hits, instance);
         return;
     }
     for (rays, hits) in rays.chunks(GROUPS).zip(hits.chunks_mut(GROUPS)) {

@@ -1,9 +1,9 @@
 //! Builds worlds.
 
 use super::World;
+use super::compact_members::build_members;
 use crate::bvh::blas::Blas;
 use crate::bvh::build::{OneAtATime, Progress, Stopped, UNWATCHED, build_in_parallel};
-use crate::bvh::compact::build_members;
 use crate::bvh::error::BuildError;
 use crate::bvh::geometry::{Geometry, Instance, SliceFacts, Sources};
 use crate::bvh::layout::wide::Unit;

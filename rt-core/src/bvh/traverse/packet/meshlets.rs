@@ -6,9 +6,10 @@ use super::{
     SeparateOrigins, SlabCounts, Triangles,
 };
 use crate::bvh::Unit;
-use crate::bvh::compact::{self, ExpandedLeaves, MeshletCache, with_cache};
+use crate::bvh::compact::{ExpandedLeaves, MeshletCache, with_cache};
 use crate::bvh::layout::wide::ChildRef;
 use crate::bvh::query::{HitQuery, TriangleTest};
+use crate::bvh::traverse::meshlets;
 use crate::bvh::traverse::packet::strategy::Strategy;
 use crate::bvh::traverse::single::traverse_from;
 use crate::bvh::traverse::tree_view::TreeView;
@@ -136,7 +137,7 @@ impl<T: TriangleTest, Q: HitQuery, O, B> Meshlets<'_, T, Q, O, B> {
         let (cache, key) = (&mut *self.cache, self.key);
         if Q::ANY {
             let inner = AnyLeaf::<T>::new(ray, t);
-            let mut leaves = compact::Meshlets { cache, key, ray, inner };
+            let mut leaves = meshlets::Meshlets { cache, key, ray, inner };
             traverse_from(simd, tree, ray, t, node, &mut leaves);
             if !leaves.inner.found {
                 return 0;
@@ -148,7 +149,7 @@ impl<T: TriangleTest, Q: HitQuery, O, B> Meshlets<'_, T, Q, O, B> {
             let (u, v) = (packet.u[g][lane], packet.v[g][lane]);
             let best = ClosestTri { t, u, v, prim: packet.prim[g][lane], found };
             let inner = ClosestLeaf::<T>::continuing(ray, best);
-            let mut leaves = compact::Meshlets { cache, key, ray, inner };
+            let mut leaves = meshlets::Meshlets { cache, key, ray, inner };
             traverse_from(simd, tree, ray, t, node, &mut leaves);
             let b = leaves.inner.best;
             if !b.found {

@@ -1,7 +1,8 @@
-//! Single rays through a compact tree.
+//! Rays through a compact tree: each by itself here, in blocks in [`blocks`].
 
-use super::cache::{MeshletCache, with_cache};
-use super::expand::Expanded;
+mod blocks;
+
+use crate::bvh::compact::{Expanded, MeshletCache, with_cache};
 use crate::bvh::layout::wide::{CHILD_ROW, ChildRef, NODE_UNITS, Unit, WIDTH};
 use crate::bvh::query::{HitQuery, TriangleTest};
 use crate::bvh::traverse::single::{
@@ -12,6 +13,7 @@ use crate::bvh::traverse::tree_view::TreeView;
 use crate::bvh::traverse::triangle_leaf::{AnyLeaf, ClosestLeaf, ClosestTri};
 use crate::ray::Ray;
 use crate::stats::{Counter, count};
+pub(crate) use blocks::trace_blocks;
 use fearless_simd::{Simd, SimdBase, SimdMask, f32x8};
 
 /// The leaf test of a compact tree: the small tree of a meshlet, and the ordinary test `inner` for

@@ -1,17 +1,16 @@
 //! Checks a finished compact tree: for [`crate::bvh::World::validate`].
 
-use super::CompactBvh;
-use super::cache::{MeshletCache, with_cache};
+use super::TreeStats;
+use crate::bvh::compact::{CompactBvh, MeshletCache, with_cache};
 use crate::bvh::layout::triangles::{leaf_floats, leaf_triangle_ids};
 use crate::bvh::layout::wide::{CHILD_ROW, ChildRef, NODE_UNITS, Unit, WIDTH, get_box};
-use crate::bvh::validate::TreeStats;
 use crate::math::Aabb;
 use fearless_simd::{Level, dispatch};
 
 impl CompactBvh {
     /// Checks that every box contains the triangles below it, whose numbers `mark` takes leaf by
     /// leaf and whose boxes `triangle` gives by their slot in the units of a leaf.
-    pub(crate) fn validate(
+    pub(super) fn validate(
         &self,
         mut mark: impl FnMut(&[u32]) -> Result<(), String>,
         triangle: impl Fn(&[Unit], ChildRef, usize) -> Aabb,

@@ -1,9 +1,9 @@
 //! Blocks of sixteen rays in any direction through a compact tree: together near the root, and
 //! through a meshlet that several of them meet one after the other, so that it is expanded once.
 
-use super::cache::{MeshletCache, with_cache};
-use super::single::Meshlets;
+use super::Meshlets;
 use crate::bvh::Unit;
+use crate::bvh::compact::{MeshletCache, with_cache};
 use crate::bvh::layout::wide::{CHILD_ROW, ChildRef, NODE_UNITS, STACK_SIZE};
 use crate::bvh::query::{HitQuery, TriangleTest};
 use crate::bvh::traverse::block_boxes::BlockSetup;
