@@ -122,9 +122,9 @@ pub enum Storage {
     #[default]
     Plain,
     /// Up to 64 triangles share their vertices, which are coded without loss: 12 to 16 bytes per
-    /// triangle of a surface, more where triangles share no vertices. Hits have the bits of [`Storage::Plain`]; rays take longer. Meshes are built in
-    /// pieces, so a build needs little more memory than what it keeps. Such meshes cannot be
-    /// refitted.
+    /// triangle of a surface, more where triangles share no vertices. Hits have the bits of
+    /// [`Storage::Plain`]; rays take longer. Meshes are built in pieces, so a build needs little
+    /// more memory than what it keeps. Such meshes cannot be refitted.
     Compact,
 }
 
