@@ -9,7 +9,7 @@
 //! # Ok::<(), rt_core::bvh::BuildError>(())
 //! ```
 
-pub use crate::bvh::{BuildOptions, Geometry, Instance, World};
+pub use crate::bvh::{BuildOptions, Geometry, Instance, Storage, World};
 pub use crate::bvh::{HitF64, MeshF64, RayF64, WorldF64};
 pub use crate::mesh::{Attribute, TriMesh};
 pub use crate::ray::{Hit, HitBlock, Ray, RayBlock};

@@ -507,7 +507,7 @@ impl Bridge {
         let build = BuildOptions {
             quality: self.options.build,
             robustness: self.options.robustness,
-            simd: None,
+            ..BuildOptions::default()
         };
         if let Some((world, placed, options)) = &self.world
             && *placed == instances

@@ -10,7 +10,7 @@ mod run;
 
 use clap::{Args, Parser, Subcommand};
 use datasets::cli::{CommonArgs, CompletionsArgs, ManArgs, run_main};
-use rt_core::bvh::{BuildQuality, Robustness};
+use rt_core::bvh::{BuildQuality, Robustness, Storage};
 use rt_core::effects::Effects;
 use rt_core::environment::Background;
 use std::path::PathBuf;
@@ -143,6 +143,10 @@ struct RenderArgs {
     /// Quality of the acceleration structure: fast, balanced, best
     #[arg(long, default_value = "balanced", value_name = "NAME", value_parser = render::quality)]
     quality: BuildQuality,
+    /// How the acceleration structure holds triangles: plain, compact (a quarter of the memory,
+    /// slower rays)
+    #[arg(long, default_value = "plain", value_name = "NAME", value_parser = render::storage)]
+    storage: Storage,
 }
 
 /// Options of `bench picture`.

@@ -8,7 +8,7 @@ use crate::image::{RenderControl, RenderRequest, RenderedImage, draw, gallery, s
 use anyhow::Context as _;
 use datasets::cli::{Cancel, CommonArgs, CureExt as _, Interrupted, UsageError};
 use datasets::colormaps;
-use rt_core::bvh::{BuildOptions, BuildQuality, Robustness, UnknownQuality};
+use rt_core::bvh::{BuildOptions, BuildQuality, Robustness, Storage, UnknownQuality};
 use rt_core::effects::Effects;
 use rt_core::environment::Background;
 use rt_core::frame::Layers;
@@ -71,7 +71,12 @@ pub(super) fn render(common: CommonArgs, args: &RenderArgs) -> anyhow::Result<()
         samples: args.samples,
         style,
         framing,
-        build: BuildOptions { quality: args.quality, robustness: args.robustness, simd: None },
+        build: BuildOptions {
+            quality: args.quality,
+            robustness: args.robustness,
+            storage: args.storage,
+            ..BuildOptions::default()
+        },
         layers: if exr.is_some() { Layers::ALL } else { Layers::COLOR },
     };
     let bar = common.progress(u64::from(args.samples), "drawing");
@@ -97,6 +102,7 @@ pub(super) fn render(common: CommonArgs, args: &RenderArgs) -> anyhow::Result<()
         "effects": rendered.report.effects.names().collect::<Vec<_>>(),
         "robustness": args.robustness.name(),
         "quality": args.quality.name(),
+        "storage": args.storage.name(),
         "rays": rays(&rendered.report.rays),
         "seconds": { "read": read_secs, "build": rendered.build_secs, "render": rendered.render_secs },
         "warnings": warnings,
@@ -254,6 +260,9 @@ pub(super) fn quality(text: &str) -> Result<BuildQuality, String> {
 }
 pub(super) fn robustness(text: &str) -> Result<Robustness, String> {
     by_name(text, "robustness", Robustness::ALL.into_iter().map(|r| (r.name(), r)))
+}
+pub(super) fn storage(text: &str) -> Result<Storage, String> {
+    by_name(text, "storage", Storage::ALL.into_iter().map(|s| (s.name(), s)))
 }
 /// Scalars and opacities of a volume's transfer function.
 #[derive(Debug, Clone)]

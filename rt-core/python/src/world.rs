@@ -92,7 +92,7 @@ impl World {
             let names = Robustness::ALL.map(Robustness::name).join(" or ");
             PyValueError::new_err(format!("there is no such robustness; give {names}"))
         })?;
-        let options = BuildOptions { quality, robustness, simd: None };
+        let options = BuildOptions { quality, robustness, ..BuildOptions::default() };
         let mut arrays = Vec::with_capacity(meshes.len());
         for (p, t, origin) in &meshes {
             let mesh = Borrowed { positions: p.try_readonly()?, triangles: t.try_readonly()? };

@@ -7,10 +7,12 @@
 //! triangle test neither overflow nor underflow.
 
 use super::build::{PrimRef, Progress, Stopped, build_wide};
+use super::compact::CompactBvh;
+use super::layout::id_leaf::{IdWriter, leaf_primitive_ids};
 use super::layout::local_frame::LocalFrame;
 use super::layout::triangles::widened;
-use super::layout::wide::{ChildRef, LeafWriter, Unit, WideBvh, write_id_leaf};
-use super::options::BuildOptions;
+use super::layout::wide::{ChildRef, Unit, WideBvh};
+use super::options::{BuildOptions, Storage};
 use super::query::{AnyHit, ClosestHit, TriangleTest};
 use super::traverse::tree_view::TreeView;
 use super::traverse::triangle_leaf::ClosestTri;
@@ -28,6 +30,7 @@ use std::sync::Arc;
 #[derive(Clone)]
 pub(crate) enum Content {
     Triangles(TriBvh),
+    Compact(CompactBvh),
     /// A member of the world's mesh group, whose tree holds the triangles.
     Member {
         bounds: Aabb,
@@ -54,21 +57,6 @@ pub(crate) struct Blas {
     pub(crate) notes: Vec<String>,
 }
 
-pub(crate) struct IdWriter;
-
-impl LeafWriter for IdWriter {
-    const UNITS: usize = 1;
-    fn write(&self, prims: &[u32], out: &mut [Unit]) {
-        write_id_leaf(out, prims.iter().copied());
-    }
-}
-
-/// The numbers in an id leaf.
-#[inline(always)]
-pub(crate) fn leaf_primitive_ids(units: &[Unit], leaf: ChildRef) -> &[u32] {
-    &units[leaf.unit()].bits()[..leaf.count()]
-}
-
 impl Blas {
     /// `given`: local space and local bounds of the geometry that this is a part of.
     pub(crate) fn for_mesh(
@@ -80,18 +68,20 @@ impl Blas {
         let frame = given
             .map_or_else(|| LocalFrame::choose(mesh.origin, mesh.bounds()), |(frame, _)| frame);
         let whole = given.map(|(_, bounds)| bounds);
-        let mut tris = TriBvh::build(mesh, &frame, 0, options.quality, progress)?;
-        let (skipped, notes) = (tris.skipped, std::mem::take(&mut tris.notes));
+        let (content, skipped, notes) = match options.storage {
+            Storage::Plain => {
+                let mut tris = TriBvh::build(mesh, &frame, 0, options.quality, progress)?;
+                let (skipped, notes) = (tris.skipped, std::mem::take(&mut tris.notes));
+                (Content::Triangles(tris), skipped, notes)
+            }
+            Storage::Compact => {
+                let mut tree = CompactBvh::build(mesh, &frame, options.quality, progress)?;
+                let (skipped, notes) = (tree.skipped, std::mem::take(&mut tree.notes));
+                (Content::Compact(tree), skipped, notes)
+            }
+        };
         let primitives = mesh.indices.len() - skipped;
-        Ok(Blas {
-            frame,
-            whole,
-            primitives,
-            skipped,
-            cost_growth: 1.0,
-            notes,
-            content: Content::Triangles(tris),
-        })
+        Ok(Blas { frame, whole, primitives, skipped, cost_growth: 1.0, notes, content })
     }
 
     pub(crate) fn for_shape(
@@ -187,6 +177,7 @@ impl Blas {
     pub(crate) fn bvh(&self) -> Option<&WideBvh> {
         match &self.content {
             Content::Triangles(t) => Some(&t.bvh),
+            Content::Compact(t) => Some(&t.bvh),
             Content::Shape { bvh, .. } => Some(bvh),
             Content::Member { .. } => None,
         }
@@ -196,6 +187,7 @@ impl Blas {
     pub(crate) fn bounds(&self) -> Aabb {
         match &self.content {
             Content::Triangles(t) => t.bvh.bounds,
+            Content::Compact(t) => t.bvh.bounds,
             Content::Shape { bvh, .. } => bvh.bounds,
             Content::Member { bounds, .. } => *bounds,
         }
@@ -205,6 +197,7 @@ impl Blas {
     pub(crate) fn depth(&self) -> usize {
         match &self.content {
             Content::Triangles(t) => t.bvh.depth,
+            Content::Compact(t) => t.bvh.depth,
             Content::Shape { bvh, .. } => bvh.depth,
             Content::Member { depth, .. } => *depth,
         }
@@ -213,6 +206,20 @@ impl Blas {
     /// Bounds that decide how rays are transformed to local space: those of the whole geometry.
     pub(crate) fn reach(&self) -> Aabb {
         self.whole.unwrap_or(self.bounds())
+    }
+
+    /// This structure with other bounds that decide how rays are transformed.
+    pub(crate) fn with_reach(self: Arc<Blas>, reach: Aabb) -> Arc<Blas> {
+        if self.whole == Some(reach) {
+            return self;
+        }
+        let mut blas = Arc::unwrap_or_clone(self);
+        blas.whole = Some(reach);
+        Arc::new(blas)
+    }
+
+    pub(crate) fn is_compact(&self) -> bool {
+        matches!(self.content, Content::Compact(_))
     }
 
     pub(crate) fn is_part(&self) -> bool {
@@ -225,6 +232,9 @@ impl Blas {
         match &self.content {
             Content::Triangles(tris) => {
                 triangle_bvh::closest::<S, T>(simd, &TreeView::all(&tris.bvh), ray)
+            }
+            Content::Compact(tree) => {
+                triangle_bvh::closest::<S, T>(simd, &TreeView::of_meshlets(tree), ray)
             }
             Content::Member { .. } => unreachable!("rays reach a member through its group"),
             Content::Shape { bvh, shape } => {
@@ -243,6 +253,9 @@ impl Blas {
         match &self.content {
             Content::Triangles(tris) => {
                 triangle_bvh::occluded::<S, T>(simd, &TreeView::all(&tris.bvh), ray)
+            }
+            Content::Compact(tree) => {
+                triangle_bvh::occluded::<S, T>(simd, &TreeView::of_meshlets(tree), ray)
             }
             Content::Member { .. } => unreachable!("rays reach a member through its group"),
             Content::Shape { bvh, shape } => {

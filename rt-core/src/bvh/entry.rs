@@ -37,6 +37,7 @@ impl<'w> Entry<'w> {
         match self {
             Entry::Instance { blas, .. } => match &blas.content {
                 Content::Triangles(tris) => Some(TreeView::all(&tris.bvh)),
+                Content::Compact(tree) => Some(TreeView::of_meshlets(tree)),
                 Content::Shape { .. } | Content::Member { .. } => None,
             },
             Entry::Group(group) => Some(group.tree(filter)),

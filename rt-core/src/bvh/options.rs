@@ -112,6 +112,35 @@ impl Robustness {
     }
 }
 
+/// How trees hold the triangles of meshes.
+///
+/// A world that renders keeps its meshes beside the tree. One from slices
+/// ([`crate::bvh::World::from_slices`]) keeps the tree alone, and that has all of the geometry.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
+pub enum Storage {
+    /// Four triangles to a leaf, each with its corners: 56 bytes per triangle.
+    #[default]
+    Plain,
+    /// Up to 64 triangles share their vertices, which are coded without loss: 12 to 16 bytes per
+    /// triangle of a surface, more where triangles share no vertices. Hits have the bits of
+    /// [`Storage::Plain`]; rays take longer. Meshes are built in pieces, so a build needs little
+    /// more memory than what it keeps. Such meshes cannot be refitted.
+    Compact,
+}
+
+impl Storage {
+    /// Both ways.
+    pub const ALL: [Storage; 2] = [Storage::Plain, Storage::Compact];
+
+    /// The name used on command lines and in records.
+    pub fn name(self) -> &'static str {
+        match self {
+            Storage::Plain => "plain",
+            Storage::Compact => "compact",
+        }
+    }
+}
+
 /// Options of [`crate::bvh::World::build`].
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct BuildOptions {
@@ -121,6 +150,8 @@ pub struct BuildOptions {
     pub robustness: Robustness,
     /// Instruction set of the traversal kernels; `None` for the best that this machine has.
     pub simd: Option<crate::simd::SimdLevel>,
+    /// Memory against time.
+    pub storage: Storage,
 }
 
 /// Report on a build: phases, sizes, and primitives left out.

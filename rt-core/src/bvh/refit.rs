@@ -68,6 +68,15 @@ pub enum RefitError {
         /// The index.
         geometry: usize,
     },
+    /// The tree is compact: its boxes and coordinates have no room for other positions.
+    #[error(
+        "geometry {geometry} is in compact storage, which cannot be refitted; build a new world, \
+         or build with Storage::Plain"
+    )]
+    Compact {
+        /// The index.
+        geometry: usize,
+    },
     /// The new mesh is unusable.
     #[error("geometry {geometry}: {source}")]
     Mesh {
@@ -155,6 +164,9 @@ impl World {
             None => return Err(RefitError::NoSuchGeometry { geometry, count }),
             Some(Geometry::Shape(_)) => return Err(RefitError::NotAMesh { geometry }),
             Some(Geometry::Slices(_)) => return Err(RefitError::WithoutArrays { geometry }),
+            Some(Geometry::Mesh(_)) if self.blas[geometry].is_compact() => {
+                return Err(RefitError::Compact { geometry });
+            }
             Some(Geometry::Mesh(_)) if self.blas[geometry].is_part() => {
                 return Err(RefitError::OfAPart { geometry });
             }
@@ -212,6 +224,9 @@ impl World {
         let count = self.geometries.len();
         if geometry >= count {
             return Err(RefitError::NoSuchGeometry { geometry, count });
+        }
+        if self.blas[geometry].is_compact() {
+            return Err(RefitError::Compact { geometry });
         }
         if meshes.len() != count {
             return Err(RefitError::Meshes { expected: count, found: meshes.len() });

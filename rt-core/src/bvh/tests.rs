@@ -17,7 +17,12 @@ pub(crate) fn all_options() -> Vec<BuildOptions> {
     for quality in BuildQuality::ALL {
         for robustness in Robustness::ALL {
             for simd in SimdLevel::available() {
-                all.push(BuildOptions { quality, robustness, simd: Some(simd) });
+                all.push(BuildOptions {
+                    quality,
+                    robustness,
+                    simd: Some(simd),
+                    ..Default::default()
+                });
             }
         }
     }

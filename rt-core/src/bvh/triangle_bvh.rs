@@ -6,6 +6,7 @@ use super::layout::triangles::TriWriter;
 use super::layout::wide::WideBvh;
 use super::options::BuildQuality;
 use super::query::TriangleTest;
+use super::traverse::meshlets;
 use super::traverse::single::{RaySetup, traverse_body};
 use super::traverse::tree_view::TreeView;
 use super::traverse::triangle_leaf::{AnyLeaf, ClosestLeaf, ClosestTri};
@@ -63,6 +64,9 @@ pub(crate) fn closest<S: Simd, T: TriangleTest>(
     tree: &TreeView<'_>,
     ray: &Ray,
 ) -> ClosestTri {
+    if tree.meshlets() != 0 {
+        return meshlets::closest::<S, T>(simd, tree, ray);
+    }
     simd.vectorize(
         #[inline(always)]
         || {
@@ -77,6 +81,9 @@ pub(crate) fn closest<S: Simd, T: TriangleTest>(
 /// Whether anything blocks a local-space ray.
 #[inline(never)]
 pub(crate) fn occluded<S: Simd, T: TriangleTest>(simd: S, tree: &TreeView<'_>, ray: &Ray) -> bool {
+    if tree.meshlets() != 0 {
+        return meshlets::occluded::<S, T>(simd, tree, ray);
+    }
     simd.vectorize(
         #[inline(always)]
         || {

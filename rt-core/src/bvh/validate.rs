@@ -1,7 +1,10 @@
 //! Checks finished trees, for tests and debugging: slow, and not needed by correct programs.
 
-use super::blas::{Blas, Content, leaf_primitive_ids};
+mod meshlets;
+
+use super::blas::{Blas, Content};
 use super::geometry::Geometry;
+use super::layout::id_leaf::leaf_primitive_ids;
 use super::layout::local_frame::LocalFrame;
 use super::layout::triangles::{
     TRI_LEAF_UNITS, TriWriter, leaf_floats, leaf_triangle_ids, row, widened,
@@ -111,11 +114,26 @@ fn validate_blas(blas: &Blas, geometry: &Geometry) -> Result<TreeStats, String> 
                 Ok(ids.iter().map(|&i| shape.bounds(i)).collect())
             })?
         }
+        (Content::Compact(tree), Geometry::Mesh(_) | Geometry::Slices(_)) => {
+            let corners = Corners::of(geometry, &blas.frame, 0);
+            let mut seen = vec![false; geometry.num_primitives()];
+            let stats = tree.validate(
+                |ids| mark(&mut seen, ids),
+                |units, leaf, slot| corners.bounds(units, leaf, slot),
+            )?;
+            if let Some(i) = (0..seen.len()).find(|&i| !seen[i] && corners.is_renderable(i)) {
+                return Err(format!("triangle {i} is in no leaf"));
+            }
+            stats
+        }
         // Checked with its group.
         (Content::Member { .. }, Geometry::Mesh(_) | Geometry::Slices(_)) => {
             return Ok(TreeStats::default());
         }
-        (Content::Triangles(_) | Content::Member { .. }, Geometry::Shape(_)) => {
+        (
+            Content::Triangles(_) | Content::Compact(_) | Content::Member { .. },
+            Geometry::Shape(_),
+        ) => {
             return Err("a tree of triangles for a shape".into());
         }
     };

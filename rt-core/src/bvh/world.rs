@@ -1,6 +1,7 @@
 //! The two-level acceleration structure for tracing rays: instances of geometries.
 
 mod build;
+mod compact_members;
 
 use super::blas::Blas;
 use super::build::UNWATCHED;

@@ -11,7 +11,7 @@ use rt_core::ray::Ray;
 use rt_core::simd::SimdLevel;
 use std::sync::Arc;
 
-fn meshes() -> Vec<(&'static str, TriMesh)> {
+pub(crate) fn meshes() -> Vec<(&'static str, TriMesh)> {
     vec![
         ("sphere", sphere(3, 1.0, DVec3::ZERO)),
         ("slivers", torus(300, 5)),
@@ -21,7 +21,7 @@ fn meshes() -> Vec<(&'static str, TriMesh)> {
     ]
 }
 
-fn views() -> Vec<(&'static str, Vec<Ray>)> {
+pub(crate) fn views() -> Vec<(&'static str, Vec<Ray>)> {
     let eye = Vec3::new(0.3, -2.0, 2.9);
     let tiles = camera(eye, Vec3::ZERO, 1.2, 3);
     let to_light = tiles
@@ -100,7 +100,12 @@ fn packets_and_levels_equal_single_rays_bit_for_bit() {
                         if (k + l) % 2 == 1 {
                             continue;
                         }
-                        let options = BuildOptions { quality, robustness, simd: Some(simd) };
+                        let options = BuildOptions {
+                            quality,
+                            robustness,
+                            simd: Some(simd),
+                            ..Default::default()
+                        };
                         let w = world(&mesh, &options);
                         let what = format!("{mesh_name}, {name}, {options:?}");
                         let hits: Vec<_> =
@@ -121,8 +126,9 @@ fn presets_give_the_same_bits() {
     // The order of the leaves must not decide the result.
     for (mesh_name, mesh) in meshes() {
         for robustness in Robustness::ALL {
-            let worlds = BuildQuality::ALL
-                .map(|quality| world(&mesh, &BuildOptions { quality, robustness, simd: None }));
+            let worlds = BuildQuality::ALL.map(|quality| {
+                world(&mesh, &BuildOptions { quality, robustness, ..Default::default() })
+            });
             for (name, rays) in views() {
                 for (i, r) in rays.iter().enumerate() {
                     let h = worlds.each_ref().map(|w| bits(w.closest(r)));

@@ -1,7 +1,7 @@
 //! Meshes, rays and checks that the tests share.
 
 use glam::{DVec3, Vec3};
-use rt_core::bvh::{BuildOptions, BuildQuality, Robustness, World};
+use rt_core::bvh::{BuildOptions, BuildQuality, Robustness, Storage, World};
 use rt_core::glam;
 use rt_core::math::SplitMix64;
 use rt_core::mesh::TriMesh;
@@ -9,30 +9,31 @@ use rt_core::ray::{Hit, HitBlock, LANES, Ray, RayBlock};
 use rt_core::simd::SimdLevel;
 use std::collections::HashMap;
 
-/// Every preset and robustness mode at every instruction set.
+/// Every preset, robustness mode and storage at every instruction set.
 pub(crate) fn all_options() -> Vec<BuildOptions> {
     let mut all = Vec::new();
     for quality in BuildQuality::ALL {
         for robustness in Robustness::ALL {
             for simd in SimdLevel::available() {
-                all.push(BuildOptions { quality, robustness, simd: Some(simd) });
+                for storage in Storage::ALL {
+                    all.push(BuildOptions { quality, robustness, simd: Some(simd), storage });
+                }
             }
         }
     }
     all
 }
 
-/// Every preset and robustness mode, each at one instruction set in turn. Enough where only the
-/// tree matters.
+/// Every preset, robustness mode and storage, each at one instruction set in turn: enough where
+/// only the tree matters.
 pub(crate) fn some_options() -> Vec<BuildOptions> {
     let levels = SimdLevel::available();
     let modes = Robustness::ALL.iter().flat_map(|&r| BuildQuality::ALL.map(|q| (q, r)));
     modes
         .enumerate()
-        .map(|(i, (quality, robustness))| BuildOptions {
-            quality,
-            robustness,
-            simd: Some(levels[(levels.len() + i - 1) % levels.len()]),
+        .flat_map(|(i, (quality, robustness))| {
+            let simd = Some(levels[(levels.len() + i - 1) % levels.len()]);
+            Storage::ALL.map(|storage| BuildOptions { quality, robustness, simd, storage })
         })
         .collect()
 }

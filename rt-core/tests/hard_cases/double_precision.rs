@@ -2,7 +2,9 @@
 
 use crate::common::{icosphere, some_options};
 use crate::exact_oracle::check;
-use rt_core::bvh::{BuildOptions, BuildQuality, HitF64, MeshF64, RayF64, Robustness, WorldF64};
+use rt_core::bvh::{
+    BuildOptions, BuildQuality, HitF64, MeshF64, RayF64, Robustness, Storage, WorldF64,
+};
 use rt_core::glam::DVec3;
 use rt_core::math::SplitMix64;
 use rt_core::simd::SimdLevel;
@@ -357,6 +359,8 @@ fn triangles_in_f64_that_cannot_be_hit_are_counted() {
         assert_eq!(world.bounds(), Some((DVec3::ZERO, DVec3::new(1.0, 1.0, 0.0))));
         let fast = options.robustness == Robustness::Fast;
         assert_eq!(report.notes.iter().any(|n| n.contains("robustness")), fast, "{report:?}");
+        let compact = options.storage == Storage::Compact;
+        assert_eq!(report.notes.iter().any(|n| n.contains("storage")), compact, "{report:?}");
         let mut rays = vec![
             RayF64::new(DVec3::new(0.25, 0.25, 3.0), DVec3::NEG_Z),
             RayF64::new(DVec3::new(-1.0, 0.0, 0.0), DVec3::X),

@@ -48,6 +48,7 @@ fn shoot(robustness: Robustness, wanted: usize) -> (u64, u64, Vec<String>) {
                     quality,
                     robustness,
                     simd: Some(simd),
+                    ..Default::default()
                 })
             })
             .map(|o| (o, World::from_mesh(mesh.clone(), &o).expect("a closed mesh")))

@@ -2,6 +2,7 @@
 
 mod agreement;
 mod common;
+mod compact;
 mod crossings;
 mod degenerate;
 mod directions;

@@ -4,7 +4,7 @@
 use crate::common::*;
 use crate::oracle::check;
 use proptest::prelude::*;
-use rt_core::bvh::{BuildOptions, BuildQuality, Geometry, Instance, Robustness, World};
+use rt_core::bvh::{BuildOptions, BuildQuality, Geometry, Instance, Robustness, Storage, World};
 use rt_core::glam::{DAffine3, DMat3, DVec3, Vec3};
 use rt_core::mesh::TriMesh;
 use rt_core::ray::Ray;
@@ -48,10 +48,12 @@ fn ray(of: impl Strategy<Value = f32> + Clone) -> impl Strategy<Value = Ray> {
 }
 
 fn options() -> impl Strategy<Value = BuildOptions> {
-    (0..BuildQuality::ALL.len(), any::<bool>()).prop_map(|(q, exact)| BuildOptions {
+    let choices = (0..BuildQuality::ALL.len(), any::<bool>(), any::<bool>());
+    choices.prop_map(|(q, exact, compact)| BuildOptions {
         quality: BuildQuality::ALL[q],
         robustness: if exact { Robustness::Watertight } else { Robustness::Fast },
         simd: None,
+        storage: if compact { Storage::Compact } else { Storage::Plain },
     })
 }
 

@@ -1,13 +1,15 @@
 //! Visits every leaf that a ray reaches, in the upper level and in the entries' trees.
 
 use crate::bvh::Unit;
-use crate::bvh::blas::{Content, leaf_primitive_ids};
+use crate::bvh::blas::Content;
 use crate::bvh::entry::Entry;
 use crate::bvh::instance_filter::InstanceFilter;
 use crate::bvh::intersect::crossing::crosses;
+use crate::bvh::layout::id_leaf::leaf_primitive_ids;
 use crate::bvh::layout::triangles::{leaf_floats, leaf_triangle_ids, row};
 use crate::bvh::layout::wide::ChildRef;
 use crate::bvh::query::{AnyHit, WatertightTest};
+use crate::bvh::traverse::meshlets;
 use crate::bvh::traverse::single::{LeafTest, RaySetup, traverse};
 use crate::bvh::traverse::tree_view::TreeView;
 use crate::bvh::traverse::triangle_leaf::test_leaf;
@@ -71,6 +73,11 @@ impl<'w, F: FnMut(Hit) -> bool> Crossings<'w, F> {
                         let mut leaves = TriangleCrossings { ray: &setup, t_max: ray.t_max, found };
                         let tree = TreeView::all(&tris.bvh);
                         traverse(simd, &tree, &setup, ray.t_max, &mut leaves);
+                    }
+                    Content::Compact(tree) => {
+                        let leaves = TriangleCrossings { ray: &setup, t_max: ray.t_max, found };
+                        let tree = TreeView::of_meshlets(tree);
+                        meshlets::search(simd, &tree, &setup, ray.t_max, leaves);
                     }
                     Content::Shape { bvh, shape } => {
                         let mut leaves = ShapeCrossings { shape: &**shape, ray, found };

@@ -3,12 +3,14 @@
 use super::ClosestPoint;
 use super::triangle::nearest_of_triangle;
 use crate::bvh::Unit;
+use crate::bvh::compact::with_cache;
 use crate::bvh::entry::Entry;
 use crate::bvh::geometry::Geometry;
 use crate::bvh::instance_filter::InstanceFilter;
 use crate::bvh::layout::triangles::{leaf_floats, leaf_triangle_ids, row};
 use crate::bvh::layout::wide::{CHILD_ROW, ChildRef, NODE_UNITS, WIDTH};
 use crate::bvh::world::World;
+use fearless_simd::dispatch;
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 
 /// Squared distances of boxes are lowered by this factor before a box is left out: more than what
@@ -56,6 +58,21 @@ impl<'w> Search<'w> {
         let render_from_local = local_from_render.inverse();
         let local = local_from_render.transform_point3(self.point);
         let scale2 = 1.0 / largest_stretch2(&local_from_render.matrix3);
+        if tree.meshlets() != 0 {
+            let level = self.world.level;
+            with_cache(|cache| {
+                self.visit(units, local, scale2, |search, leaf| {
+                    let (expanded, words) =
+                        dispatch!(level, simd => cache.meshlet(simd, tree.meshlets(), units, leaf));
+                    let (nodes, leaves) = expanded.parts();
+                    search.visit(nodes, local, scale2, |search, leaf| {
+                        let units = dispatch!(level, simd => leaves.with(simd, words, leaf));
+                        search.test_leaf(units, leaf, entry, &render_from_local);
+                    });
+                });
+            });
+            return;
+        }
         self.visit(units, local, scale2, |search, leaf| {
             search.test_leaf(units, leaf, entry, &render_from_local);
         });

@@ -10,7 +10,7 @@ use super::nearest::Nearest;
 use crate::bvh::build::MAX_PRIMS;
 use crate::bvh::error::BuildError;
 use crate::bvh::layout::wide::Unit;
-use crate::bvh::options::{BuildOptions, BuildReport, Robustness};
+use crate::bvh::options::{BuildOptions, BuildReport, Robustness, Storage};
 use crate::bvh::traverse::single::traverse_body;
 use crate::bvh::traverse::tree_view::TreeView;
 use crate::mesh::MeshError;
@@ -77,6 +77,13 @@ impl WorldF64 {
         let triangles = Numbered::new(meshes);
         let mut tree = build_tree(&triangles, options.quality);
         let mut notes = std::mem::take(&mut tree.notes);
+        if options.storage == Storage::Compact {
+            notes.push(
+                "storage `compact` is for meshes in f32; leaves here hold numbers of triangles, \
+                 and the meshes keep their corners"
+                    .into(),
+            );
+        }
         if options.robustness == Robustness::Fast {
             notes.push(
                 "robustness `fast` has no effect on rays in f64: they are always watertight".into(),

@@ -50,8 +50,9 @@ impl<'m> TriWriter<'m> {
 }
 
 impl TriWriter<'_> {
+    /// The corners of triangle `i` of the mesh, as leaves hold them.
     #[inline(always)]
-    fn triangle(&self, i: u32) -> [Vec3; 3] {
+    pub(crate) fn corners(&self, i: u32) -> [Vec3; 3] {
         let corners = self.mesh.corners(i);
         if self.plain { corners } else { corners.map(|p| self.frame.local(self.mesh.origin, p)) }
     }
@@ -69,7 +70,7 @@ impl TriWriter<'_> {
         if !self.mesh.is_renderable(i as usize) {
             return Aabb::EMPTY;
         }
-        let [a, b, c] = self.triangle(i);
+        let [a, b, c] = self.corners(i);
         widened(Aabb::new(a.min(b).min(c), a.max(b).max(c)))
     }
 }
@@ -86,7 +87,7 @@ impl LeafWriter for TriWriter<'_> {
         let last = prims.len() - 1;
         for slot in 0..LEAF_SIZE {
             let id = prims[slot.min(last)];
-            let mut corners = self.triangle(id);
+            let mut corners = self.corners(id);
             if !corners.iter().all(|p| p.is_finite()) {
                 corners = [Vec3::ZERO; 3];
             }

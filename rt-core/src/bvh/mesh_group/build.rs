@@ -158,7 +158,7 @@ fn source_of<'w>(old: &KnownTree<'w>, previous: Option<&'w Arc<MeshGroup>>) -> O
     match &old.blas.content {
         Content::Triangles(tris) => Some(Source::Alone(&tris.bvh)),
         Content::Member { .. } => Some(Source::Member(previous?, old.member?)),
-        Content::Shape { .. } => None,
+        Content::Compact(_) | Content::Shape { .. } => None,
     }
 }
 

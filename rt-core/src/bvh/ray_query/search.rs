@@ -3,12 +3,14 @@
 
 use super::Accept;
 use crate::bvh::Unit;
-use crate::bvh::blas::{Content, leaf_primitive_ids};
+use crate::bvh::blas::Content;
 use crate::bvh::entry::Entry;
 use crate::bvh::instance_filter::InstanceFilter;
+use crate::bvh::layout::id_leaf::leaf_primitive_ids;
 use crate::bvh::layout::triangles::{leaf_floats, leaf_triangle_ids};
 use crate::bvh::layout::wide::ChildRef;
 use crate::bvh::query::{ClosestHit, TriangleTest};
+use crate::bvh::traverse::meshlets;
 use crate::bvh::traverse::single::{LeafTest, RaySetup, inflate_t, traverse};
 use crate::bvh::traverse::tree_view::TreeView;
 use crate::bvh::traverse::triangle_leaf::{ClosestTri, test_leaf};
@@ -104,8 +106,12 @@ impl<'w, T: TriangleTest> AcceptedHits<'w, T> {
                     accepts: &accepts,
                     test: PhantomData,
                 };
-                traverse(simd, &tree, &setup, ray.t_max, &mut leaves);
-                leaves.best
+                if tree.meshlets() != 0 {
+                    meshlets::search(simd, &tree, &setup, ray.t_max, leaves).best
+                } else {
+                    traverse(simd, &tree, &setup, ray.t_max, &mut leaves);
+                    leaves.best
+                }
             }
             (None, Entry::Instance { blas, .. }) => {
                 let Content::Shape { bvh, shape } = &blas.content else { return };

@@ -17,7 +17,7 @@ pub(crate) struct BlockSetup<S: Simd> {
 
 impl<S: Simd> BlockSetup<S> {
     #[inline(always)]
-    pub(super) fn new(simd: S, rays: &RayBlock) -> Self {
+    pub(crate) fn new(simd: S, rays: &RayBlock) -> Self {
         let directions = [&rays.dx, &rays.dy, &rays.dz];
         let origins = [&rays.ox, &rays.oy, &rays.oz];
         let d: [f32x16<S>; 3] = three!(|a| f32x16::from_slice(simd, directions[a]));
@@ -72,7 +72,7 @@ impl<S: Simd> BlockSetup<S> {
     /// The constants of each ray for its own traversal, from the reciprocals of the block: the bits
     /// of [`RaySetup::new`] without its divisions.
     #[inline(always)]
-    pub(super) fn rays(&self, rays: &RayBlock) -> [RaySetup; LANES] {
+    pub(crate) fn rays(&self, rays: &RayBlock) -> [RaySetup; LANES] {
         let rcp: [[f32; LANES]; 3] = three!(|a| self.rcp[a].to_array());
         let ray = |lane: usize| {
             let lane = lane & 15;

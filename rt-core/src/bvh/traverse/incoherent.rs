@@ -1,7 +1,7 @@
 //! Traces blocks of rays in any direction through a triangle hierarchy.
 
 use super::tree_view::TreeView;
-use super::{hybrid, scattered};
+use super::{hybrid, meshlets, scattered};
 use crate::bvh::Unit;
 use crate::bvh::layout::wide::NODE_UNITS;
 use crate::bvh::query::{HitQuery, TriangleTest};
@@ -36,6 +36,10 @@ pub(crate) fn trace<S: Simd, T: TriangleTest, Q: HitQuery>(
     hits: &mut [HitBlock],
     instance: u32,
 ) {
+    if tree.meshlets() != 0 {
+        meshlets::trace_blocks::<S, T, Q>(simd, tree, rays, hits, instance);
+        return;
+    }
     for (rays, hits) in rays.chunks(GROUPS).zip(hits.chunks_mut(GROUPS)) {
         let mut choices = CHOICES.get();
         let choice = &mut choices[Q::ANY as usize];

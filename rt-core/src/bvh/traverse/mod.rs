@@ -5,6 +5,7 @@ pub(crate) mod block_entries;
 mod hybrid;
 pub(crate) mod incoherent;
 pub(crate) mod interleaved;
+pub(crate) mod meshlets;
 pub(crate) mod packet;
 mod scattered;
 pub(crate) mod single;

@@ -115,7 +115,7 @@ pub(crate) trait LeafTest<S: Simd> {
 
 /// The slots of a row of references that hold leaves, or nothing.
 #[inline(always)]
-pub(super) fn leaf_slots<S: Simd>(simd: S, refs: &[u32; WIDTH]) -> u32 {
+pub(crate) fn leaf_slots<S: Simd>(simd: S, refs: &[u32; WIDTH]) -> u32 {
     u32x8::from_slice(simd, refs).simd_ge(u32x8::splat(simd, 1 << 31)).to_bitmask() as u32
 }
 

@@ -5,6 +5,7 @@
 //! other children there, so it never descends into geometry that it does not ask for. Below the
 //! upper part, and in trees of one geometry, nothing is left out and nothing is looked up.
 
+use crate::bvh::compact::CompactBvh;
 use crate::bvh::instance_filter::InstanceFilter;
 use crate::bvh::layout::wide::{NODE_UNITS, Unit, WIDTH, WideBvh};
 
@@ -22,13 +23,34 @@ pub(crate) struct TreeView<'a> {
     filtered_units: usize,
     owners: &'a [ChildOwners],
     filter: InstanceFilter<'a>,
+    /// The key of a compact tree; 0 for trees whose leaves are triangles.
+    meshlets: u64,
 }
 
 impl<'a> TreeView<'a> {
     /// All of a tree.
     #[inline]
     pub(crate) fn all(bvh: &'a WideBvh) -> Self {
-        TreeView { units: &bvh.units, filtered_units: 0, owners: &[], filter: InstanceFilter::All }
+        TreeView::of_units(&bvh.units)
+    }
+
+    /// All of a tree in an array of its own.
+    #[inline]
+    pub(crate) fn of_units(units: &'a [Unit]) -> Self {
+        let filter = InstanceFilter::All;
+        TreeView { units, filtered_units: 0, owners: &[], filter, meshlets: 0 }
+    }
+
+    /// All of a compact tree.
+    #[inline]
+    pub(crate) fn of_meshlets(tree: &'a CompactBvh) -> Self {
+        TreeView { meshlets: tree.key, ..TreeView::all(&tree.bvh) }
+    }
+
+    /// The key of a compact tree; 0 when the leaves are triangles.
+    #[inline(always)]
+    pub(crate) fn meshlets(&self) -> u64 {
+        self.meshlets
     }
 
     /// The subtrees of `filter`'s instances. `owners` belong to the nodes of the upper part, which
@@ -43,7 +65,7 @@ impl<'a> TreeView<'a> {
             InstanceFilter::All => 0,
             _ => owners.len() * NODE_UNITS,
         };
-        TreeView { units: &bvh.units, filtered_units, owners, filter }
+        TreeView { units: &bvh.units, filtered_units, owners, filter, meshlets: 0 }
     }
 
     /// Those of the `children` of the node at unit `node` that belong to the query.

@@ -1,6 +1,7 @@
 //! Builds worlds.
 
 use super::World;
+use super::compact_members::build_members;
 use crate::bvh::blas::Blas;
 use crate::bvh::build::{OneAtATime, Progress, Stopped, UNWATCHED, build_in_parallel};
 use crate::bvh::error::BuildError;
@@ -9,7 +10,7 @@ use crate::bvh::layout::wide::Unit;
 use crate::bvh::mesh_group::{
     GroupChoice, GroupInput, KnownTree, KnownTrees, build_group, choose_members,
 };
-use crate::bvh::options::{BuildOptions, BuildReport};
+use crate::bvh::options::{BuildOptions, BuildReport, Storage};
 use crate::bvh::partition::{GlobalLayout, blas_of};
 use crate::bvh::top_level::{TopLevel, build_top_level, choose_origin};
 use crate::mesh::{MeshSlices, TriMesh};
@@ -282,10 +283,16 @@ impl<'a> BuildRequest<'a> {
                 options,
                 progress,
             };
-            build_group(&input, known.as_ref(), earlier, &mut notes)
+            match options.storage {
+                Storage::Plain => build_group(&input, known.as_ref(), earlier, &mut notes)
+                    .map(|built| built.map(|(group, blas)| (Some(group), blas))),
+                Storage::Compact => {
+                    build_members(&input, known.as_ref()).map(|blas| Some((None, blas)))
+                }
+            }
         };
         let group = choice.as_ref().map(build_group_of).transpose()?.flatten();
-        let group = group.map(|(group, of_members)| {
+        let group = group.and_then(|(group, of_members)| {
             for (&geometry, b) in members.iter().zip(of_members) {
                 blas[geometry] = Some(b);
             }

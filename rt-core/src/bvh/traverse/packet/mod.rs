@@ -14,6 +14,7 @@
 
 mod entries;
 mod load;
+mod meshlets;
 mod strategy;
 mod switch_to_single;
 mod triangles;
@@ -175,6 +176,7 @@ impl Packet {
         let (strategy, start) = choice.next(self.common_origin);
         let most_leaving = strategy.most_leaving();
         let counts = match (self.common_origin, strategy) {
+            _ if tree.meshlets() != 0 => self.walk_compact::<S, T, Q>(simd, tree, strategy),
             (false, _) => {
                 let mut leaves = Triangles::<T, Q, SeparateOrigins>::new();
                 self.walk::<S, _, IntervalsAndRays>(simd, tree, &mut leaves, most_leaving)

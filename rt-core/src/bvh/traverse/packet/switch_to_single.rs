@@ -24,7 +24,7 @@ impl Packet {
     /// The data that a ray needs to continue alone: the packet's own numbers, so that its results
     /// keep the same bits.
     #[inline(always)]
-    fn setup(&self, g: usize, lane: usize) -> RaySetup {
+    pub(super) fn setup(&self, g: usize, lane: usize) -> RaySetup {
         let [kx, ky, kz] = self.axes;
         let of = |rows: &[[f32; LANES]; 3]| [rows[0][lane], rows[1][lane], rows[2][lane]];
         let [sx, sy, sz] = of(&self.shear[g]);

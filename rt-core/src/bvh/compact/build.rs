@@ -1,0 +1,135 @@
+//! Builds compact trees: piece by piece, meshlets first, the nodes above them last.
+//!
+//! ```text
+//! triangles ─ divide ─► pieces ─ build_wide ─► trees of numbers ─ cut ─► parts
+//! parts ─ encode ─► meshlets;   their boxes ─ build_wide ─► nodes above
+//! ```
+
+use super::CompactBvh;
+use super::cache::new_key;
+use super::cut::{Part, parts};
+use super::meshlet::{Encoder, one_to_a_leaf};
+use super::pieces::divide;
+use crate::bvh::build::{PrimRef, Progress, Stopped, build_wide};
+use crate::bvh::layout::id_leaf::IdWriter;
+use crate::bvh::layout::local_frame::LocalFrame;
+use crate::bvh::layout::triangles::TriWriter;
+use crate::bvh::layout::wide::{
+    CHILD_ROW, ChildRef, LeafWriter, MAX_DEPTH, NODE_UNITS, Unit, WideBvh,
+};
+use crate::bvh::options::BuildQuality;
+use crate::math::Aabb;
+use crate::mesh::Triangles;
+use rayon::prelude::*;
+
+/// Parts that one task encodes.
+const PARTS_PER_TASK: usize = 128;
+
+/// Leaves of the nodes above: meshlets, which lie elsewhere in the array.
+struct MeshletRefs<'m>(&'m [(Aabb, usize)]);
+
+impl LeafWriter for MeshletRefs<'_> {
+    const UNITS: usize = 0;
+    const CAPACITY: usize = 1;
+    const COUNTS: bool = false;
+
+    fn write(&self, _: &[u32], _: &mut [Unit]) {}
+
+    fn reference(&self, _: usize, prims: &[u32]) -> ChildRef {
+        ChildRef::leaf(self.0[prims[0] as usize].1, 1)
+    }
+}
+
+impl CompactBvh {
+    /// Triangle `i` of the mesh gets the number `i`.
+    pub(crate) fn build(
+        mesh: Triangles<'_>,
+        frame: &LocalFrame,
+        quality: BuildQuality,
+        progress: &Progress<'_>,
+    ) -> Result<CompactBvh, Stopped> {
+        let triangles = TriWriter::new(mesh, frame, 0);
+        let usable = |&i: &u32| progress.goes_on_at(i) && mesh.is_renderable(i as usize);
+        let mut ids = Vec::with_capacity(mesh.indices.len());
+        ids.extend((0..mesh.indices.len() as u32).filter(usable));
+        progress.check()?;
+        let skipped = mesh.indices.len() - ids.len();
+        let ends = divide(&mut ids, &triangles, progress)?;
+
+        // ---- The meshlets, behind the place of the root.
+        let mut notes = Vec::new();
+        let mut units = vec![Unit::ZERO; NODE_UNITS];
+        let mut placed: Vec<(Aabb, usize)> = Vec::new();
+        let mut start = 0;
+        for end in ends {
+            let piece = &ids[start..end];
+            start = end;
+            if piece.is_empty() {
+                continue;
+            }
+            let refs = piece.par_iter().with_min_len(1 << 12);
+            let refs: Vec<PrimRef> = refs.map(|&i| PrimRef::new(triangles.bounds(i), i)).collect();
+            let tree = build_wide(refs, &IdWriter, quality.config(), &mut notes, progress)?;
+            let parts = parts(&tree);
+            drop(tree);
+            append(&parts, &triangles, &mut units, &mut placed);
+            progress.check()?;
+        }
+        drop(ids);
+
+        // ---- The nodes above, behind the meshlets; the root goes to the start.
+        let refs = placed.iter().enumerate();
+        let refs = refs.map(|(i, (bounds, _))| PrimRef::new(*bounds, i as u32)).collect();
+        let above = build_wide(refs, &MeshletRefs(&placed), one_to_a_leaf(), &mut notes, progress)?;
+        // No tree of meshlets is deeper than one of triangles may be, and theirs end above it.
+        debug_assert!(above.depth <= MAX_DEPTH, "depth {}", above.depth);
+        drop(placed);
+        let moved = units.len() - NODE_UNITS;
+        grow(&mut units, above.units.len() - NODE_UNITS);
+        for (n, node) in above.units.chunks_exact(NODE_UNITS).enumerate() {
+            let at = if n == 0 { 0 } else { units.len() };
+            if n > 0 {
+                units.extend_from_slice(node);
+            } else {
+                units[..NODE_UNITS].copy_from_slice(node);
+            }
+            for child in units[at + CHILD_ROW].bits_mut() {
+                let reference = ChildRef(*child);
+                if !reference.is_leaf() {
+                    *child = reference.moved(moved).0;
+                }
+            }
+        }
+        units.shrink_to_fit();
+        let bvh = WideBvh { units, bounds: above.bounds, depth: above.depth };
+        Ok(CompactBvh { bvh, skipped, notes, key: new_key() })
+    }
+}
+
+/// Encodes parts and appends them; the tasks are the same for any number of threads.
+fn append(
+    parts: &[Part],
+    triangles: &TriWriter<'_>,
+    units: &mut Vec<Unit>,
+    placed: &mut Vec<(Aabb, usize)>,
+) {
+    let encode = |parts: &[Part]| {
+        let (mut encoder, mut units, mut placed) = (Encoder::default(), Vec::new(), Vec::new());
+        parts.iter().for_each(|p| encoder.write(p, triangles, &mut units, &mut placed));
+        (units, placed)
+    };
+    let tasks: Vec<_> = parts.par_chunks(PARTS_PER_TASK).map(encode).collect();
+    grow(units, tasks.iter().map(|(units, _)| units.len()).sum());
+    for (more, boxes) in tasks {
+        let first = units.len();
+        placed.extend(boxes.into_iter().map(|(bounds, at)| (bounds, first + at)));
+        units.extend_from_slice(&more);
+    }
+}
+
+/// Makes room for `more` units. Doubling would take twice the memory of the tree.
+fn grow(units: &mut Vec<Unit>, more: usize) {
+    if units.capacity() - units.len() < more {
+        units.reserve_exact(more.max(units.len() / 8));
+    }
+}

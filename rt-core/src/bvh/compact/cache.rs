@@ -1,0 +1,67 @@
+//! The meshlets that a thread has expanded last.
+
+use super::expand::Expanded;
+use crate::bvh::layout::wide::{ChildRef, Unit};
+use fearless_simd::Simd;
+use std::cell::Cell;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Expanded meshlets per thread, as a power of two: 1.4 MiB, of which mostly a part is in use.
+const SLOTS_LOG2: u32 = 8;
+
+/// A key that no tree of this process has had.
+pub(super) fn new_key() -> u64 {
+    static NEXT: AtomicU64 = AtomicU64::new(1);
+    NEXT.fetch_add(1, Ordering::Relaxed)
+}
+
+/// Expanded meshlets. Each has one place where it can be.
+pub(crate) struct MeshletCache {
+    /// Key of the tree and first unit of what each place holds.
+    held: [(u64, u32); 1 << SLOTS_LOG2],
+    expanded: Vec<Expanded>,
+}
+
+impl MeshletCache {
+    fn new() -> Box<MeshletCache> {
+        let expanded = (0..1 << SLOTS_LOG2).map(|_| Expanded::EMPTY).collect();
+        Box::new(MeshletCache { held: [(0, 0); 1 << SLOTS_LOG2], expanded })
+    }
+
+    /// The meshlet `leaf` of the tree with this key, expanded, and the words that it starts.
+    #[inline(always)]
+    pub(crate) fn meshlet<'u, S: Simd>(
+        &mut self,
+        simd: S,
+        key: u64,
+        units: &'u [Unit],
+        leaf: ChildRef,
+    ) -> (&mut Expanded, &'u [u32]) {
+        let unit = leaf.unit();
+        let words: &[u32] = bytemuck::cast_slice(&units[unit..]);
+        // Neighbours in the array are neighbours in space: a multiplication spreads all.
+        let place = (unit as u32).wrapping_mul(0x9e37_79b9) >> (32 - SLOTS_LOG2);
+        let (held, expanded) = (&mut self.held[place as usize], &mut self.expanded[place as usize]);
+        if *held != (key, unit as u32) {
+            // Should a panic leave it half done, the place must not count as filled.
+            *held = (0, 0);
+            expanded.load(simd, words);
+            *held = (key, unit as u32);
+        }
+        (expanded, words)
+    }
+}
+
+thread_local! {
+    static CACHE: Cell<Option<Box<MeshletCache>>> = const { Cell::new(None) };
+}
+
+/// Calls `work` with the thread's meshlets. A query inside `work`, from a caller's function, starts
+/// without any.
+#[inline]
+pub(crate) fn with_cache<R>(work: impl FnOnce(&mut MeshletCache) -> R) -> R {
+    let mut cache = CACHE.take().unwrap_or_else(MeshletCache::new);
+    let result = work(&mut cache);
+    CACHE.set(Some(cache));
+    result
+}

@@ -1,0 +1,194 @@
+//! A meshlet in the layout of the ordinary tree: the small tree at once, each leaf when a ray first
+//! reaches it.
+
+use super::bits;
+use super::boxes::plane;
+use super::coordinates::Coordinates;
+use super::cut::MAX_LEAVES;
+use super::meshlet::{HEADER_WORDS, Header, MAX_NODES, NODE, NONE};
+use crate::bvh::layout::triangles::TRI_LEAF_UNITS;
+use crate::bvh::layout::wide::{CHILD_ROW, ChildRef, LEAF_SIZE, NODE_UNITS, Unit, WIDTH};
+use fearless_simd::Simd;
+
+const NODES: usize = NODE_UNITS * MAX_NODES;
+const LEAVES: usize = TRI_LEAF_UNITS * MAX_LEAVES;
+
+/// An expanded meshlet. References in its nodes lead to its own nodes and leaves.
+pub(crate) struct Expanded {
+    pub(crate) nodes: [Unit; NODES],
+    pub(crate) leaves: ExpandedLeaves,
+}
+
+/// The leaves of an expanded meshlet, some of them not yet expanded.
+pub(crate) struct ExpandedLeaves {
+    units: [Unit; LEAVES],
+    /// The leaves that are in `units`.
+    present: u32,
+    /// First triangle and last triangle of each leaf.
+    triangles: [[u8; 2]; MAX_LEAVES],
+    index_bits: u32,
+    vertex_mask: u32,
+    id_bits: u32,
+    first_id: u32,
+    /// Where vertex numbers and triangle numbers start, in bits.
+    indices: usize,
+    ids: usize,
+    coordinates: [Coordinates; 3],
+}
+
+impl Expanded {
+    pub(super) const EMPTY: Expanded = Expanded {
+        nodes: [Unit::ZERO; NODES],
+        leaves: ExpandedLeaves {
+            units: [Unit::ZERO; LEAVES],
+            present: 0,
+            triangles: [[0; 2]; MAX_LEAVES],
+            index_bits: 0,
+            vertex_mask: 0,
+            id_bits: 0,
+            first_id: 0,
+            indices: 0,
+            ids: 0,
+            coordinates: [Coordinates::EMPTY; 3],
+        },
+    };
+
+    /// Expands the small tree of the meshlet at the start of `words`.
+    #[inline(never)]
+    pub(super) fn load<S: Simd>(&mut self, simd: S, words: &[u32]) {
+        simd.vectorize(
+            #[inline(always)]
+            || self.load_body(words),
+        );
+    }
+
+    #[inline(always)]
+    fn load_body(&mut self, words: &[u32]) {
+        let header = Header::read(words);
+        let leaves = &mut self.leaves;
+        leaves.present = 0;
+
+        // ---- The nodes.
+        let (origin, steps) = (header.lattice.origin, header.lattice.steps());
+        let (mut at, mut next_node, mut next_leaf, mut triangle) = (HEADER_WORDS, 1, 0, 0u32);
+        for node in self.nodes.chunks_exact_mut(NODE_UNITS).take(header.nodes as usize) {
+            let kinds = words[at];
+            let mut children = [ChildRef::NONE.0; WIDTH];
+            let mut count = 0;
+            for (slot, child) in children.iter_mut().enumerate() {
+                let kind = kinds >> (4 * slot) & 15;
+                if kind == NONE {
+                    break;
+                }
+                count = slot + 1;
+                if kind == NODE {
+                    *child = ChildRef::node(NODE_UNITS * (next_node % MAX_NODES)).0;
+                    next_node += 1;
+                } else {
+                    let leaf = next_leaf % MAX_LEAVES;
+                    next_leaf += 1;
+                    let last = triangle + (kind & 3);
+                    *child = ChildRef::leaf(TRI_LEAF_UNITS * leaf, (kind & 3) as usize + 1).0;
+                    leaves.triangles[leaf] = [triangle as u8, last as u8];
+                    triangle = last + 1;
+                }
+            }
+            let planes: &[u8] = bytemuck::cast_slice(&words[at + 1..]);
+            for (row, unit) in node[..CHILD_ROW].iter_mut().enumerate() {
+                let mut q = [0u8; WIDTH];
+                q[..count].copy_from_slice(&planes[row * count..][..count]);
+                let (origin, step) = (origin[row / 2], steps[row / 2]);
+                for (x, q) in unit.0.iter_mut().zip(q) {
+                    *x = plane(origin, step, q);
+                }
+                // Boxes of no child are empty: as in the ordinary tree.
+                let empty = if row % 2 == 0 { f32::INFINITY } else { f32::NEG_INFINITY };
+                unit.0[count..].fill(empty);
+            }
+            *node[CHILD_ROW].bits_mut() = children;
+            at += 1 + (6 * count).div_ceil(4);
+        }
+
+        // ---- What leaves are read from.
+        let triangles = header.triangles as usize;
+        leaves.index_bits = header.index_bits;
+        leaves.vertex_mask = (1 << header.index_bits) - 1;
+        leaves.id_bits = header.id_bits;
+        leaves.first_id = header.first_id;
+        leaves.indices = 32 * at;
+        leaves.ids = leaves.indices + 3 * triangles * header.index_bits as usize;
+        let mut at = leaves.ids + triangles * header.id_bits as usize;
+        for (coordinates, axis) in leaves.coordinates.iter_mut().zip(&header.axes) {
+            (*coordinates, at) = Coordinates::at(axis, header.vertices, at);
+        }
+    }
+
+    /// The units of the nodes, the units of the leaves.
+    #[inline(always)]
+    pub(crate) fn parts(&mut self) -> (&[Unit; NODES], &mut ExpandedLeaves) {
+        (&self.nodes, &mut self.leaves)
+    }
+}
+
+impl ExpandedLeaves {
+    /// The units that hold `leaf`, which is expanded first where it is not. `words` start with the
+    /// meshlet.
+    #[inline(always)]
+    pub(crate) fn with<S: Simd>(&mut self, simd: S, words: &[u32], leaf: ChildRef) -> &[Unit] {
+        let number = leaf.unit() / TRI_LEAF_UNITS;
+        if self.present >> number & 1 == 0 {
+            self.expand(simd, words, number);
+        }
+        &self.units
+    }
+
+    /// The units with the leaves in `slots` of a row of references.
+    #[inline(always)]
+    pub(crate) fn with_many<S: Simd>(
+        &mut self,
+        simd: S,
+        words: &[u32],
+        refs: &[u32; WIDTH],
+        mut slots: u32,
+    ) -> &[Unit] {
+        while slots != 0 {
+            self.with(simd, words, ChildRef(refs[slots.trailing_zeros() as usize & 7]));
+            slots &= slots - 1;
+        }
+        &self.units
+    }
+
+    #[inline(never)]
+    fn expand<S: Simd>(&mut self, simd: S, words: &[u32], leaf: usize) {
+        simd.vectorize(
+            #[inline(always)]
+            || self.expand_body(words, leaf),
+        );
+    }
+
+    #[inline(always)]
+    fn expand_body(&mut self, words: &[u32], leaf: usize) {
+        let [first, last] = self.triangles[leaf].map(u32::from);
+        let units = &mut self.units[TRI_LEAF_UNITS * leaf..][..TRI_LEAF_UNITS];
+        let floats: &mut [f32] = bytemuck::cast_slice_mut(units);
+        let floats: &mut [f32; 8 * TRI_LEAF_UNITS] = floats.try_into().expect("a leaf's units");
+        for slot in 0..LEAF_SIZE {
+            // Unused slots repeat the last triangle, as in the ordinary tree.
+            let triangle = (first + slot as u32).min(last);
+            // The three numbers together: 24 bits at most.
+            let three = 3 * self.index_bits;
+            let vertices = bits::read(words, self.indices + (triangle * three) as usize, three);
+            for corner in 0..3 {
+                let vertex = vertices >> (corner as u32 * self.index_bits) & self.vertex_mask;
+                for axis in 0..3 {
+                    floats[4 * (3 * corner + axis) + slot] =
+                        self.coordinates[axis].of(words, vertex);
+                }
+            }
+            let at = self.ids + (triangle * self.id_bits) as usize;
+            let id = self.first_id.wrapping_add(bits::read(words, at, self.id_bits));
+            floats[36 + slot] = f32::from_bits(id);
+        }
+        self.present |= 1 << leaf;
+    }
+}

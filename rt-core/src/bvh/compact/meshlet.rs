@@ -1,0 +1,263 @@
+//! The form of a meshlet: 32-bit words, of which the first are a header of fixed length.
+//!
+//! ```text
+//! word 0      triangles − 1 (6 bits), vertices − 1 (8), nodes − 1 (4), leaves − 1 (5),
+//!             bits of a triangle number (6)
+//! word 1      the lowest triangle number
+//! word 2      exponents of the boxes' lattice + 127 (8 bits each), bits of a vertex number (4)
+//! words 3–5   origin of the lattice
+//! words 6–8   smallest coordinates
+//! word 9      bits of the coordinates (6 each)
+//! word 10     different coordinates, when each is stored once (8 each)
+//! then        the nodes: kinds of the children (4 bits each), planes (a byte each)
+//! then        without gaps: three vertex numbers per triangle, triangle numbers, x, y, z
+//! ```
+//!
+//! Nodes are in the order in which the nodes before them name them, and so are leaves and their
+//! triangles: neither needs a reference.
+
+use super::bits::{self, Writer};
+use super::boxes::Lattice;
+use super::coordinates::Axis;
+use super::cut::Part;
+use crate::bvh::build::{BuilderConfig, LeafCapacity, PrimRef, UNWATCHED, build_wide};
+use crate::bvh::layout::triangles::TriWriter;
+use crate::bvh::layout::wide::{
+    CHILD_ROW, ChildRef, LeafWriter, NODE_UNITS, Unit, WIDTH, WideBvh, get_box,
+};
+use crate::bvh::options::BuildQuality;
+use crate::math::Aabb;
+use std::collections::VecDeque;
+
+/// Most nodes of the small tree.
+pub(super) const MAX_NODES: usize = 9;
+/// Words before the nodes.
+pub(super) const HEADER_WORDS: usize = 11;
+
+/// A child that is a node. Leaves have their number of triangles less one, in two bits.
+pub(super) const NODE: u32 = 8;
+/// No child.
+pub(super) const NONE: u32 = 15;
+
+/// The fixed part of a meshlet.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Header {
+    pub(super) triangles: u32,
+    pub(super) vertices: u32,
+    pub(super) nodes: u32,
+    pub(super) leaves: u32,
+    /// Bits of a triangle number less the lowest one.
+    pub(super) id_bits: u32,
+    pub(super) first_id: u32,
+    /// Bits of a vertex number.
+    pub(super) index_bits: u32,
+    pub(super) lattice: Lattice,
+    pub(super) axes: [Axis; 3],
+}
+
+impl Header {
+    fn words(&self) -> [u32; HEADER_WORDS] {
+        let three = |bits: u32, of: fn(&Axis) -> u32| {
+            self.axes.iter().rev().fold(0, |word, axis| word << bits | of(axis))
+        };
+        let counts = (self.triangles - 1)
+            | (self.vertices - 1) << 6
+            | (self.nodes - 1) << 14
+            | (self.leaves - 1) << 18
+            | self.id_bits << 23;
+        let exponents =
+            self.lattice.exponents.iter().rev().fold(0, |word, e| word << 8 | (e + 127) as u32);
+        let [ox, oy, oz] = self.lattice.origin.map(f32::to_bits);
+        let [x, y, z] = self.axes.map(|axis| axis.base);
+        let (bits, entries) = (three(6, |axis| axis.bits), three(8, |axis| axis.entries));
+        let exponents = exponents | self.index_bits << 24;
+        [counts, self.first_id, exponents, ox, oy, oz, x, y, z, bits, entries]
+    }
+
+    #[inline(always)]
+    pub(super) fn read(words: &[u32]) -> Header {
+        let words: &[u32; HEADER_WORDS] = words.first_chunk().expect("a meshlet's header");
+        let axis = |a: usize| Axis {
+            base: words[6 + a],
+            bits: words[9] >> (6 * a) & 63,
+            entries: words[10] >> (8 * a) & 255,
+        };
+        let exponent = |a: usize| (words[2] >> (8 * a) & 255) as i32 - 127;
+        Header {
+            triangles: (words[0] & 63) + 1,
+            vertices: (words[0] >> 6 & 255) + 1,
+            nodes: (words[0] >> 14 & 15) + 1,
+            leaves: (words[0] >> 18 & 31) + 1,
+            id_bits: words[0] >> 23 & 63,
+            first_id: words[1],
+            index_bits: words[2] >> 24 & 15,
+            lattice: Lattice {
+                origin: [words[3], words[4], words[5]].map(f32::from_bits),
+                exponents: [exponent(0), exponent(1), exponent(2)],
+            },
+            axes: [axis(0), axis(1), axis(2)],
+        }
+    }
+}
+
+/// Leaves of the small tree, by their number in the part.
+struct LeafNumbers;
+
+impl LeafWriter for LeafNumbers {
+    const UNITS: usize = 0;
+    const CAPACITY: usize = 1;
+    const COUNTS: bool = false;
+
+    fn write(&self, _: &[u32], _: &mut [Unit]) {}
+
+    fn reference(&self, _: usize, prims: &[u32]) -> ChildRef {
+        ChildRef::leaf(prims[0] as usize, 1)
+    }
+}
+
+/// The settings for trees with one leaf of the writer per box.
+pub(super) fn one_to_a_leaf() -> BuilderConfig {
+    let mut config = BuildQuality::Balanced.config();
+    config.sah.leaves = LeafCapacity::One;
+    config
+}
+
+/// Writes meshlets; keeps its buffers from one to the next.
+#[derive(Default)]
+pub(super) struct Encoder {
+    sorted: Vec<u32>,
+    corners: Vec<([u32; 3], u32)>,
+    vertex_of_corner: Vec<u32>,
+    values: [Vec<f32>; 3],
+}
+
+impl Encoder {
+    /// Appends the meshlets of a part, of which each has its box and its first unit, to `out`: one,
+    /// unless the part's small tree would have too many nodes.
+    pub(super) fn write(
+        &mut self,
+        part: &Part,
+        triangles: &TriWriter<'_>,
+        out: &mut Vec<Unit>,
+        placed: &mut Vec<(Aabb, usize)>,
+    ) {
+        let refs = part.leaves.iter().enumerate();
+        let refs = refs.map(|(i, leaf)| PrimRef::new(leaf.bounds, i as u32)).collect();
+        let tree = build_wide(refs, &LeafNumbers, one_to_a_leaf(), &mut Vec::new(), &UNWATCHED);
+        let Ok(tree) = tree else { unreachable!("nobody watches") };
+        if tree.units.len() / NODE_UNITS > MAX_NODES {
+            // Boxes without surface: the builder has no reason to fill its nodes.
+            let (first, second) = part.leaves.split_at(part.leaves.len() / 2);
+            for half in [first, second] {
+                self.write(&Part::of(half.to_vec()), triangles, out, placed);
+            }
+            return;
+        }
+        placed.push((tree.bounds, out.len()));
+        let words = self.words(part, &tree, triangles);
+        let units = words.len().div_ceil(8);
+        let first = out.len();
+        out.resize(first + units, Unit::ZERO);
+        let room: &mut [u32] = bytemuck::cast_slice_mut(&mut out[first..]);
+        room[..words.len()].copy_from_slice(&words);
+    }
+
+    fn words(&mut self, part: &Part, tree: &WideBvh, triangles: &TriWriter<'_>) -> Vec<u32> {
+        let lattice = Lattice::over(tree.bounds);
+        let (nodes, order) = code_nodes(part, tree, &lattice);
+        let ids: Vec<u32> =
+            order.iter().flat_map(|&leaf| part.leaves[leaf].ids()).copied().collect();
+
+        // ---- Vertices: equal bits are one vertex.
+        let corners = ids.iter().flat_map(|&id| triangles.corners(id));
+        let corners = corners.map(|p| p.to_array().map(f32::to_bits));
+        self.corners.clear();
+        self.corners.extend(corners.zip(0..));
+        self.vertex_of_corner.resize(self.corners.len(), 0);
+        self.corners.sort_unstable();
+        self.values.iter_mut().for_each(Vec::clear);
+        let mut last = None;
+        for &(bits, corner) in &self.corners {
+            if last != Some(bits) {
+                last = Some(bits);
+                for (values, bits) in self.values.iter_mut().zip(bits) {
+                    values.push(f32::from_bits(bits));
+                }
+            }
+            self.vertex_of_corner[corner as usize] = self.values[0].len() as u32 - 1;
+        }
+        let vertices = self.values[0].len() as u32;
+        let index_bits = bits::width(vertices - 1);
+
+        // ---- Triangle numbers.
+        let first_id = ids.iter().copied().min().unwrap_or(0);
+        let last_id = ids.iter().copied().max().unwrap_or(0);
+        let id_bits = bits::width(last_id - first_id);
+
+        let mut sorted = [const { Vec::new() }; 3];
+        let axes = std::array::from_fn(|a| {
+            let axis = Axis::choose(&self.values[a], &mut self.sorted);
+            sorted[a].clone_from(&self.sorted);
+            axis
+        });
+        let header = Header {
+            triangles: ids.len() as u32,
+            vertices,
+            nodes: (tree.units.len() / NODE_UNITS) as u32,
+            leaves: part.leaves.len() as u32,
+            id_bits,
+            first_id,
+            index_bits,
+            lattice,
+            axes,
+        };
+        let mut words = header.words().to_vec();
+        words.extend(nodes);
+        let mut out = Writer::new(&mut words);
+        self.vertex_of_corner.iter().for_each(|&vertex| out.push(vertex, index_bits));
+        ids.iter().for_each(|&id| out.push(id - first_id, id_bits));
+        for ((axis, values), sorted) in axes.iter().zip(&self.values).zip(&sorted) {
+            axis.write(values, sorted, &mut out);
+        }
+        out.finish();
+        words
+    }
+}
+
+/// The nodes of the small tree, breadth first, and its leaves in the order in which they occur.
+fn code_nodes(part: &Part, tree: &WideBvh, lattice: &Lattice) -> (Vec<u32>, Vec<usize>) {
+    let (mut words, mut leaves) = (Vec::new(), Vec::new());
+    let mut queue = VecDeque::from([0]);
+    while let Some(at) = queue.pop_front() {
+        let node = &tree.units[at..at + NODE_UNITS];
+        let (mut kinds, mut rows, mut count) = (u32::MAX, [[0u8; WIDTH]; 6], 0);
+        for slot in 0..WIDTH {
+            let child = ChildRef(node[CHILD_ROW].bits()[slot]);
+            if child == ChildRef::NONE {
+                break;
+            }
+            let kind = if child.is_leaf() {
+                leaves.push(child.unit());
+                part.leaves[child.unit()].count as u32 - 1
+            } else {
+                queue.push_back(child.unit());
+                NODE
+            };
+            kinds = kinds & !(NONE << (4 * slot)) | kind << (4 * slot);
+            for (axis, planes) in lattice.around(get_box(node, slot)).into_iter().enumerate() {
+                for (side, q) in planes.into_iter().enumerate() {
+                    rows[2 * axis + side][slot] = q;
+                }
+            }
+            count = slot + 1;
+        }
+        words.push(kinds);
+        let planes: Vec<u8> = rows.iter().flat_map(|row| &row[..count]).copied().collect();
+        words.extend(
+            planes
+                .chunks(4)
+                .map(|four| four.iter().rev().fold(0, |word, &q| word << 8 | u32::from(q))),
+        );
+    }
+    (words, leaves)
+}

@@ -1,0 +1,164 @@
+//! Rays through a compact tree: each by itself here, in blocks in [`blocks`].
+
+mod blocks;
+
+use crate::bvh::compact::{Expanded, MeshletCache, with_cache};
+use crate::bvh::layout::wide::{CHILD_ROW, ChildRef, NODE_UNITS, Unit, WIDTH};
+use crate::bvh::query::{HitQuery, TriangleTest};
+use crate::bvh::traverse::single::{
+    BOX_SLACK, LeafTest, RaySetup, leaf_slots, traverse, traverse_body,
+};
+use crate::bvh::traverse::three;
+use crate::bvh::traverse::tree_view::TreeView;
+use crate::bvh::traverse::triangle_leaf::{AnyLeaf, ClosestLeaf, ClosestTri};
+use crate::ray::Ray;
+use crate::stats::{Counter, count};
+pub(crate) use blocks::trace_blocks;
+use fearless_simd::{Simd, SimdBase, SimdMask, f32x8};
+
+/// The leaf test of a compact tree: the small tree of a meshlet, and the ordinary test `inner` for
+/// its leaves.
+pub(crate) struct Meshlets<'a, L> {
+    pub(crate) cache: &'a mut MeshletCache,
+    pub(crate) key: u64,
+    pub(crate) ray: &'a RaySetup,
+    pub(crate) inner: L,
+}
+
+impl<S: Simd, L: LeafTest<S>> LeafTest<S> for Meshlets<'_, L> {
+    type Query = L::Query;
+
+    #[inline(always)]
+    fn test(&mut self, simd: S, units: &[Unit], leaf: ChildRef, skip_t: &mut f32) -> bool {
+        let (expanded, words) = self.cache.meshlet(simd, self.key, units, leaf);
+        visit(simd, expanded, words, self.ray, skip_t, &mut self.inner)
+    }
+}
+
+/// A ray through the small tree of a meshlet. As [`traverse`], whose results must not differ.
+#[inline(always)]
+fn visit<S: Simd, L: LeafTest<S>>(
+    simd: S,
+    expanded: &mut Expanded,
+    words: &[u32],
+    ray: &RaySetup,
+    skip_t: &mut f32,
+    inner: &mut L,
+) -> bool {
+    let (nodes, leaves) = expanded.parts();
+    let origin: [f32x8<S>; 3] = three!(|a| f32x8::splat(simd, ray.origin[a]));
+    let rcp: [f32x8<S>; 3] = three!(|a| f32x8::splat(simd, ray.rcp[a]));
+    let t_min = f32x8::splat(simd, ray.t_min);
+    let slack = f32x8::splat(simd, BOX_SLACK);
+    let [nx, ny, nz] = ray.near;
+    // The distance in the high half, as in the ordinary tree. No more than the nodes.
+    let mut stack = [0u64; 16];
+    let (mut len, mut at) = (0, 0);
+    loop {
+        count(Counter::Nodes, 1);
+        let node: &[Unit; NODE_UNITS] =
+            nodes[at..at + NODE_UNITS].try_into().expect("a slice of that length");
+        let plane = |row: usize, axis: usize| {
+            (f32x8::from_slice(simd, &node[row & 7].0) - origin[axis]) * rcp[axis]
+        };
+        let near = plane(nx, 0).max(plane(ny, 1)).max(plane(nz, 2).max(t_min));
+        let far = plane(nx ^ 1, 0).min(plane(ny ^ 1, 1)).min(plane(nz ^ 1, 2)) * slack;
+        let hit = near.simd_le(far.min(f32x8::splat(simd, *skip_t))).to_bitmask() as u32;
+        let refs = node[CHILD_ROW].bits();
+        let now = hit & leaf_slots(simd, refs);
+        if now != 0 {
+            count(Counter::Leaves, now.count_ones() as u64);
+            let units = leaves.with_many(simd, words, refs, now);
+            if inner.test_many(simd, units, refs, now, skip_t) {
+                return true;
+            }
+        }
+        let mut rest = hit & !now;
+        if rest != 0 {
+            let near: [f32; WIDTH] = near.to_array();
+            let base = len;
+            while rest != 0 {
+                let slot = rest.trailing_zeros() as usize & 7;
+                rest &= rest - 1;
+                let entry = u64::from(near[slot].to_bits()) << 32 | u64::from(refs[slot]);
+                // Farthest first, so that the nearest is on top.
+                let mut place = len & 15;
+                while !<L::Query as HitQuery>::ANY
+                    && place > base
+                    && stack[(place - 1) & 15] < entry
+                {
+                    stack[place & 15] = stack[(place - 1) & 15];
+                    place -= 1;
+                }
+                stack[place & 15] = entry;
+                len += 1;
+            }
+        }
+        loop {
+            if len == 0 {
+                return false;
+            }
+            len -= 1;
+            let entry = stack[len & 15];
+            if f32::from_bits((entry >> 32) as u32) <= *skip_t {
+                at = ChildRef(entry as u32).unit();
+                break;
+            }
+        }
+    }
+}
+
+/// A search of `tree`, which is compact, by one ray with the ordinary leaf test.
+pub(crate) fn search<S: Simd, L: LeafTest<S>>(
+    simd: S,
+    tree: &TreeView<'_>,
+    ray: &RaySetup,
+    t_max: f32,
+    inner: L,
+) -> L {
+    with_cache(|cache| {
+        let mut leaves = Meshlets { cache, key: tree.meshlets(), ray, inner };
+        traverse(simd, tree, ray, t_max, &mut leaves);
+        leaves.inner
+    })
+}
+
+/// The closest hit of a local-space ray.
+#[inline(never)]
+pub(crate) fn closest<S: Simd, T: TriangleTest>(
+    simd: S,
+    tree: &TreeView<'_>,
+    ray: &Ray,
+) -> ClosestTri {
+    with_cache(|cache| {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let setup = RaySetup::new(ray);
+                let inner = ClosestLeaf::<T>::new(&setup, ray.t_max);
+                let key = tree.meshlets();
+                let mut leaves = Meshlets { cache, key, ray: &setup, inner };
+                traverse_body(simd, tree, &setup, ray.t_max, &mut leaves);
+                leaves.inner.best
+            },
+        )
+    })
+}
+
+/// Whether anything blocks a local-space ray.
+#[inline(never)]
+pub(crate) fn occluded<S: Simd, T: TriangleTest>(simd: S, tree: &TreeView<'_>, ray: &Ray) -> bool {
+    with_cache(|cache| {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let setup = RaySetup::new(ray);
+                let inner = AnyLeaf::<T>::new(&setup, ray.t_max);
+                let key = tree.meshlets();
+                let mut leaves = Meshlets { cache, key, ray: &setup, inner };
+                traverse_body(simd, tree, &setup, ray.t_max, &mut leaves);
+                leaves.inner.found
+            },
+        )
+    })
+}
