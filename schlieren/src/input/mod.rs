@@ -256,13 +256,6 @@ pub fn from_dataset(data: &Dataset, options: &Options) -> Result<LoadedField, In
     let points = lattice::SamplePoints::find(data, options)?;
     let columns = options.medium.columns(data, &points)?;
     let mut index = evaluate::evaluate(&columns, options, &mut report)?;
-    let largest = report.n_minus_1_range[1];
-    if largest > MOST_N_MINUS_1 {
-        return Err(InputError::Option {
-            what: format!("n - 1 is up to {largest:.3e}, and no medium has that"),
-            cure: "check the units of the arrays",
-        });
-    }
     let background = reference::median(&index);
     if !background.is_finite() {
         return Err(InputError::Option {
@@ -282,6 +275,16 @@ pub fn from_dataset(data: &Dataset, options: &Options) -> Result<LoadedField, In
         let before = on.values.clone();
         resample::smooth(&mut on.values, on.lattice.dims, options.smoothing_nodes)?;
         report.smoothing_rms = rms_difference(&before, &on.values);
+    }
+
+    // Hidden points may have any value.
+    let inside = on.values.iter().zip(&on.marks).filter(|(_, m)| **m == Mark::Inside);
+    let largest = inside.map(|(d, _)| f64::from(*d) + background).fold(0.0, f64::max);
+    if largest > MOST_N_MINUS_1 {
+        return Err(InputError::Option {
+            what: format!("n - 1 is up to {largest:.3e}, and no medium has that"),
+            cure: "check the units of the arrays",
+        });
     }
 
     // eps = n/n0 − 1 = (d − d0)/n0, where d is n − 1 less the background.
