@@ -100,6 +100,8 @@ from shapes import sphere, rays
 large = sphere({rings})
 scene = rt_core.Scene(*sphere(256))
 origins, directions = rays(4_000_000)
+# Who starts the tests in the background may have told them to ignore Ctrl-C.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 def interrupt():
     time.sleep(0.2)
     global sent

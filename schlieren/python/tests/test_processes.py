@@ -69,6 +69,8 @@ import schlieren
 from flows import field, render
 of = field(48)
 render(of, size=(8, 8), layers=())
+# Who starts the tests in the background may have told them to ignore Ctrl-C.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 def interrupt():
     time.sleep(0.3)
     os.kill(os.getpid(), signal.SIGINT)
