@@ -3,7 +3,7 @@
 //!
 //! An archive may hold the lattice: coordinates along the axes as one-dimensional arrays `x`, `y`
 //! and `z` (or for each point, as `numpy.meshgrid(..., indexing='ij')` makes them), or `spacing`
-//! and `origin`. Otherwise spacing and origin come from [`OpenOptions`](super::OpenOptions) or from
+//! and `origin`. Otherwise spacing and origin come from [`OpenOptions`] or from
 //! a file `NAME.npy.toml` beside it:
 //! ```toml
 //! spacing = [0.001, 0.001, 0.001]
