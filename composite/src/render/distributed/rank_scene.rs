@@ -11,7 +11,8 @@ use rt_core::transfer_function::TransferFunction;
 use rt_core::volume::{GridExtent, VolumeOptions};
 use std::sync::Arc;
 
-/// The part of a scene that one rank has: the input of [`super::DataParallel::distributed`].
+/// The part of a scene that one rank has: the input of
+/// [`DataParallel::distributed`](crate::render::DataParallel::distributed).
 ///
 /// The scene is the sum of what all ranks give. An *object* has a name; what ranks give under one
 /// name are pieces of one object, whose primitives count from those of rank 0 on. The objects are
