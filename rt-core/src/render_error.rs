@@ -33,6 +33,14 @@ pub enum RenderError {
         /// What to do.
         cure: &'static str,
     },
+    /// A shape could not read its data, so the image is not right.
+    #[error("geometry {geometry} (counted from 0) could not be read while rendering: {reason}")]
+    Unreadable {
+        /// Number of the geometry in the scene.
+        geometry: usize,
+        /// What the shape says.
+        reason: String,
+    },
     /// A bug: the renderer panicked. The rest of the process is not affected.
     #[error(
         "internal error at pixel ({x}, {y}), sample {sample}: {message}; it repeats with crop: \

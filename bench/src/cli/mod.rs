@@ -7,6 +7,8 @@ mod quote;
 mod render;
 mod report;
 mod run;
+mod store;
+mod stored_mesh;
 
 use clap::{Args, Parser, Subcommand};
 use datasets::cli::{CommonArgs, CompletionsArgs, ManArgs, run_main};
@@ -41,6 +43,9 @@ enum Command {
     Quote,
     /// Renders a file: meshes, isosurfaces of image data, lines as tubes, points as spheres
     Render(RenderArgs),
+    /// Writes a mesh to a file that `bench render` draws without reading all of it
+    #[command(after_help = store::EXAMPLES)]
+    Store(StoreArgs),
     /// Renders one of the report's images of generated data
     #[command(name = "picture")]
     Image(ImageArgs),
@@ -78,6 +83,26 @@ struct RunArgs {
     out: Option<PathBuf>,
 }
 
+/// Options of `bench store`.
+#[derive(Debug, Args)]
+struct StoreArgs {
+    /// A mesh, or image data for an isosurface, in any format that `bench render` reads
+    #[arg(required_unless_present = "wavelet")]
+    file: Option<PathBuf>,
+    /// Instead of a file: nested isosurfaces of VTK's wavelet, with so many million triangles
+    #[arg(long, value_name = "MILLIONS", conflicts_with = "file", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    wavelet: Option<u32>,
+    /// The file to write (.rtmesh)
+    #[arg(long, short, value_name = "FILE")]
+    out: PathBuf,
+    /// Isovalue for image data [default: the middle of the range]
+    #[arg(long, value_name = "VALUE", allow_hyphen_values = true, requires = "file")]
+    isovalue: Option<f32>,
+    /// Megabytes that small pieces may take before they are written. More make faster files
+    #[arg(long, value_name = "MB", default_value_t = 1024, value_parser = clap::value_parser!(u64).range(1..))]
+    memory: u64,
+}
+
 /// Options of `bench report`.
 #[derive(Debug, Args)]
 struct ReportArgs {
@@ -91,7 +116,7 @@ struct ReportArgs {
 /// Options of `bench render`.
 #[derive(Debug, Args)]
 struct RenderArgs {
-    /// VTK (.vtp .vtu .vti .vtr .vts, parallel, .pvd, legacy), PLOT3D, NRRD, MetaImage, NumPy, OBJ,
+    /// A mesh that `bench store` wrote, VTK (.vtp .vtu .vti .vtr .vts, parallel, .pvd, legacy), PLOT3D, NRRD, MetaImage, NumPy, OBJ,
     /// glTF, PLY, STL, or the folder of an OpenFOAM case
     file: PathBuf,
     /// The image as PNG
@@ -100,6 +125,9 @@ struct RenderArgs {
     /// The image as OpenEXR: colour, depth, distance, normal, ids, rays per pixel
     #[arg(long, value_name = "EXR")]
     exr: Option<PathBuf>,
+    /// Megabytes for the parts of a stored mesh that are in memory at a time
+    #[arg(long, value_name = "MB", default_value_t = 1024)]
+    memory: u64,
     /// Pixels per row and rows
     #[arg(long, default_value = "960x540", value_name = "WxH", value_parser = render::size)]
     size: [u32; 2],
@@ -182,6 +210,7 @@ fn execute(cli: Cli) -> anyhow::Result<()> {
         Some(Command::Report(args)) => report::report(common, &args),
         Some(Command::Quote) => quote::quote(common),
         Some(Command::Render(args)) => render::render(common, &args),
+        Some(Command::Store(args)) => store::store(common, &args),
         Some(Command::Image(args)) => render::gallery_image(common, &args),
         Some(Command::Peers) => peers::peers(common),
         Some(Command::Completions(args)) => args.print::<Cli>(),

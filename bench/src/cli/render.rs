@@ -1,6 +1,6 @@
 //! `bench render` and `bench picture`.
 
-use super::{ImageArgs, RenderArgs};
+use super::{ImageArgs, RenderArgs, stored_mesh};
 use crate::image::framing::{Framing, read_camera};
 use crate::image::style::{BACKGROUNDS, RenderStyle};
 use crate::image::subject::{LoadOptions, Subject, VolumeChoice};
@@ -36,9 +36,9 @@ pub(super) fn render(common: CommonArgs, args: &RenderArgs) -> anyhow::Result<()
 
     let start = Instant::now();
     common.note(1, format_args!("reading {file}"));
-    let opened = datasets::read::open(&args.file)?;
     let load_options =
         LoadOptions { color_by: args.color_by.clone(), isovalue: args.isovalue, volume };
+    let stored = stored_mesh::open(args, &load_options)?;
     let cure = if load_options.volume == VolumeChoice::No {
         "look at the file with the options --color-by and --isovalue in mind, or convert it to \
          .vtp or .vti with ParaView"
@@ -47,13 +47,21 @@ pub(super) fn render(common: CommonArgs, args: &RenderArgs) -> anyhow::Result<()
          saved as .vti; \
          --volume names one of its arrays"
     };
-    let subject = Subject::from_file(&opened, &load_options)
-        .with_context(|| format!("{file}: cannot be drawn so"))
-        .cure(cure)?;
-    let (format, read_secs) = (opened.format, start.elapsed().as_secs_f64());
-    drop(opened);
+    let (subject, format) = match &stored {
+        Some(mesh) => (Subject::from_stored(mesh), "stored mesh"),
+        None => {
+            let opened = datasets::read::open(&args.file)?;
+            let subject = Subject::from_file(&opened, &load_options)
+                .with_context(|| format!("{file}: cannot be drawn so"))
+                .cure(cure)?;
+            (subject, opened.format)
+        }
+    };
+    let read_secs = start.elapsed().as_secs_f64();
     cancel.check()?;
-    let (triangles, contents) = (subject.triangles(), subject.contents.clone());
+    let triangles =
+        stored.as_ref().map_or(subject.triangles() as u64, |mesh| mesh.report().triangles);
+    let contents = subject.contents.clone();
     let scalar_range = args.range.or(subject.scalar_range);
     let mut warnings = subject.warnings.clone();
 
@@ -104,6 +112,7 @@ pub(super) fn render(common: CommonArgs, args: &RenderArgs) -> anyhow::Result<()
         "quality": args.quality.name(),
         "storage": args.storage.name(),
         "rays": rays(&rendered.report.rays),
+        "stored": stored.as_deref().map(stored_mesh::page_use),
         "seconds": { "read": read_secs, "build": rendered.build_secs, "render": rendered.render_secs },
         "warnings": warnings,
         "output": png,

@@ -7,7 +7,7 @@ use datasets::catalogue::Data;
 use datasets::model::{ColorBy, Dataset};
 use datasets::read::{Content, LoadedFile, SceneModel};
 use glam::{DVec3, Vec3};
-use rt_core::bvh::Geometry;
+use rt_core::bvh::{Geometry, StoredMesh};
 use rt_core::grid::Grid;
 use rt_core::material::Material;
 use rt_core::mesh::{Attribute, TriMesh};
@@ -199,6 +199,28 @@ impl Subject {
             ));
         }
         Ok(subject)
+    }
+
+    /// The triangles of a file that is larger than memory.
+    pub fn from_stored(mesh: &Arc<StoredMesh>) -> Subject {
+        let mut subject = Subject::empty(DVec3::Z);
+        let (report, bounds) = (mesh.report(), mesh.bounds_of_all());
+        subject.contents.push(format!("{} stored triangles", report.triangles));
+        if report.skipped > 0 {
+            subject.warnings.push(format!(
+                "{} triangles were left out when the mesh was stored",
+                report.skipped
+            ));
+        }
+        let outline = if bounds.is_empty() {
+            vec![]
+        } else {
+            let at = |corner: Vec3| mesh.origin() + corner.as_dvec3();
+            corners_of_box(at(bounds.min), at(bounds.max)).into_iter().collect()
+        };
+        let coloring = PartColoring::Color(DEFAULT_COLOR);
+        subject.parts.push(Part::shape(mesh.clone(), coloring, outline));
+        subject
     }
 
     fn extend_scalar_range(&mut self, scalars: &[f32]) {

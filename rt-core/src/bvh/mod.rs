@@ -25,6 +25,7 @@ mod query;
 mod ray_query;
 mod refit;
 mod several_entries;
+mod stored_mesh;
 mod streams;
 mod top_level;
 pub(crate) mod traverse;
@@ -43,6 +44,7 @@ pub use options::{BuildOptions, BuildQuality, BuildReport, Robustness, Storage, 
 pub use partition::GlobalLayout;
 pub use ray_query::{MaskError, RayQuery};
 pub use refit::{RefitError, RefitReport};
+pub use stored_mesh::{PageUse, StoredMesh, StoredMeshError, StoredMeshReport, StoredMeshWriter};
 pub(crate) use streams::Coherence;
 pub use streams::StreamError;
 pub use validate::{InvalidTree, TreeStats};

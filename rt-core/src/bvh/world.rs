@@ -50,6 +50,15 @@ pub struct World {
 }
 
 impl World {
+    /// The first shape that could not read its data, by its number, and what it says
+    /// ([`crate::shapes::Shape::failure`]). Answers since then may be wrong.
+    pub fn failure(&self) -> Option<(usize, String)> {
+        self.geometries.iter().enumerate().find_map(|(number, geometry)| match geometry {
+            Geometry::Shape(shape) => shape.failure().map(|reason| (number, reason)),
+            Geometry::Mesh(_) | Geometry::Slices(_) => None,
+        })
+    }
+
     /// Rebuilds the upper level after a geometry has changed. Render space may have another origin.
     pub(super) fn rebuild_top_level(&mut self, origin: DVec3) {
         let notes = &mut self.report.notes;

@@ -199,6 +199,9 @@ impl<'a> ProgressiveRenderer<'a> {
             };
             self.tiles.par_iter_mut().map(draw_tile).try_reduce(none, add)?
         };
+        if let Some((geometry, reason)) = context.scene.world.failure() {
+            return Err(RenderError::Unreadable { geometry, reason });
+        }
         self.rays += rays;
         let complete = missing == 0;
         self.samples += complete as u32;

@@ -101,6 +101,13 @@ pub trait Shape: Send + Sync {
     fn tree_of(&self) -> Option<Arc<dyn Shape>> {
         None
     }
+
+    /// Why answers since the shape was made may be wrong, for a shape whose data can become
+    /// unreadable (in a file, for example): what it was, and what to do. A render that finds one
+    /// at its end fails with it.
+    fn failure(&self) -> Option<String> {
+        None
+    }
 }
 
 /// Whether any colour is transparent.

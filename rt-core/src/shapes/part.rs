@@ -51,4 +51,8 @@ impl Shape for ShapePart {
     fn has_transparency(&self) -> bool {
         self.shape.has_transparency()
     }
+
+    fn failure(&self) -> Option<String> {
+        self.shape.failure()
+    }
 }

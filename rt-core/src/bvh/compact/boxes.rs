@@ -14,6 +14,9 @@ pub(super) struct Lattice {
     pub(super) exponents: [i32; 3],
 }
 
+/// Exponents that a lattice may have.
+pub(super) const EXPONENTS: std::ops::RangeInclusive<i32> = -126..=127;
+
 const LAST: u8 = 255;
 
 /// The plane `q` of a lattice with this origin and step.
@@ -29,7 +32,7 @@ impl Lattice {
         let exponents = std::array::from_fn(|a| {
             let extent = f64::from(hi[a]) - f64::from(origin[a]);
             let fine = (extent / f64::from(LAST)).log2().floor();
-            let mut e = (fine as i32).clamp(-126, 127);
+            let mut e = (fine as i32).clamp(*EXPONENTS.start(), *EXPONENTS.end());
             // Ends: at 127 the last plane is beyond all finite numbers.
             while e < 127 && plane(origin[a], exp2i(e), LAST) < hi[a] {
                 e += 1;

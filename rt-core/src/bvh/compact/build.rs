@@ -9,7 +9,7 @@ use super::CompactBvh;
 use super::cache::new_key;
 use super::cut::{Part, parts};
 use super::meshlet::{Encoder, one_to_a_leaf};
-use super::pieces::divide;
+use super::pieces::{PIECE, divide};
 use crate::bvh::build::{PrimRef, Progress, Stopped, build_wide};
 use crate::bvh::layout::id_leaf::IdWriter;
 use crate::bvh::layout::local_frame::LocalFrame;
@@ -54,7 +54,18 @@ impl CompactBvh {
         ids.extend((0..mesh.indices.len() as u32).filter(usable));
         progress.check()?;
         let skipped = mesh.indices.len() - ids.len();
-        let ends = divide(&mut ids, &triangles, progress)?;
+        let tree = CompactBvh::of_triangles(&triangles, ids, quality, progress)?;
+        Ok(CompactBvh { skipped, ..tree })
+    }
+
+    /// The tree of the triangles `ids`, which can all be built.
+    pub(crate) fn of_triangles(
+        triangles: &TriWriter<'_>,
+        mut ids: Vec<u32>,
+        quality: BuildQuality,
+        progress: &Progress<'_>,
+    ) -> Result<CompactBvh, Stopped> {
+        let ends = divide(&mut ids, triangles, PIECE, progress)?;
 
         // ---- The meshlets, behind the place of the root.
         let mut notes = Vec::new();
@@ -72,7 +83,7 @@ impl CompactBvh {
             let tree = build_wide(refs, &IdWriter, quality.config(), &mut notes, progress)?;
             let parts = parts(&tree);
             drop(tree);
-            append(&parts, &triangles, &mut units, &mut placed);
+            append(&parts, triangles, &mut units, &mut placed);
             progress.check()?;
         }
         drop(ids);
@@ -102,7 +113,7 @@ impl CompactBvh {
         }
         units.shrink_to_fit();
         let bvh = WideBvh { units, bounds: above.bounds, depth: above.depth };
-        Ok(CompactBvh { bvh, skipped, notes, key: new_key() })
+        Ok(CompactBvh { bvh, skipped: 0, notes, key: new_key() })
     }
 }
 

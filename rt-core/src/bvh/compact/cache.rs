@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 const SLOTS_LOG2: u32 = 8;
 
 /// A key that no tree of this process has had.
-pub(super) fn new_key() -> u64 {
+pub(crate) fn new_key() -> u64 {
     static NEXT: AtomicU64 = AtomicU64::new(1);
     NEXT.fetch_add(1, Ordering::Relaxed)
 }

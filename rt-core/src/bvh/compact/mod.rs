@@ -21,6 +21,7 @@ mod bits;
 mod boxes;
 mod build;
 mod cache;
+mod check;
 mod coordinates;
 mod cut;
 mod expand;
@@ -28,8 +29,10 @@ mod meshlet;
 mod pieces;
 
 use super::layout::wide::WideBvh;
-pub(crate) use cache::{MeshletCache, with_cache};
+pub(crate) use cache::{MeshletCache, new_key, with_cache};
+pub(crate) use check::check_units;
 pub(crate) use expand::{Expanded, ExpandedLeaves};
+pub(crate) use pieces::divide;
 
 /// A tree whose leaves are meshlets.
 #[derive(Clone)]

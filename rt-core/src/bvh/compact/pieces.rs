@@ -9,17 +9,19 @@ use crate::math::Aabb;
 use glam::Vec3;
 use rayon::prelude::*;
 
-/// Most triangles of a piece.
+/// Most triangles of a piece of a mesh in memory.
 pub(super) const PIECE: usize = 1 << 18;
 
-/// Orders `ids` so that each `PIECE`-th part or less of it is a piece, and returns their ends.
-pub(super) fn divide(
+/// Orders `ids` so that neighbours in space are in one of its pieces, of at most `most` triangles,
+/// and returns their ends.
+pub(crate) fn divide(
     ids: &mut [u32],
     triangles: &TriWriter<'_>,
+    most: usize,
     progress: &Progress<'_>,
 ) -> Result<Vec<usize>, Stopped> {
     progress.check()?;
-    if ids.len() <= PIECE {
+    if ids.len() <= most {
         return Ok(vec![ids.len()]);
     }
     let center = |id: u32| {
@@ -32,14 +34,14 @@ pub(super) fn divide(
     let extent: Vec3 = bounds.extent();
     let axis = (0..3).fold(0, |best, a| if extent[a] > extent[best] { a } else { best });
     // The middle, to a whole number of pieces. Numbers decide between equal centres.
-    let middle = (ids.len() / 2).next_multiple_of(PIECE).min(ids.len() - 1);
+    let middle = (ids.len() / 2).next_multiple_of(most).min(ids.len() - 1);
     ids.select_nth_unstable_by(middle, |&a, &b| {
         center(a)[axis].total_cmp(&center(b)[axis]).then(a.cmp(&b))
     });
     let (left, right) = ids.split_at_mut(middle);
     let (mut ends, right) = match rayon::join(
-        || divide(left, triangles, progress),
-        || divide(right, triangles, progress),
+        || divide(left, triangles, most, progress),
+        || divide(right, triangles, most, progress),
     ) {
         (Ok(left), Ok(right)) => (left, right),
         _ => return Err(Stopped),

@@ -1,0 +1,129 @@
+//! Checks the units of a compact tree that come from a file, before a ray follows them: no number
+//! in them leads out of the array, no path is endless, and no path is too deep.
+
+use super::bits;
+use super::boxes::EXPONENTS;
+use super::coordinates::{Axis, Coordinates};
+use super::cut::MAX_LEAVES;
+use super::meshlet::{HEADER_WORDS, Header, MAX_NODES, NODE, NONE};
+use crate::bvh::layout::wide::{CHILD_ROW, ChildRef, MAX_DEPTH, NODE_UNITS, Unit, WIDTH};
+
+/// Bits of a vertex number in a meshlet of at most 192 vertices.
+const MAX_INDEX_BITS: u32 = 8;
+
+/// Checks a tree, of which the root is at unit 0, and returns its depth. The error says what is
+/// wrong with it.
+pub(crate) fn check_units(units: &[Unit]) -> Result<usize, &'static str> {
+    if units.len() < NODE_UNITS || units.len() >= ChildRef::MAX_UNITS {
+        return Err("it has no root, or more units than references reach");
+    }
+    let (mut nodes, mut depth) = (0, 0);
+    let mut open = vec![(0, 1)];
+    while let Some((at, level)) = open.pop() {
+        nodes += 1;
+        depth = level.max(depth);
+        if nodes > units.len() / NODE_UNITS {
+            return Err("its nodes lead back to themselves");
+        }
+        if depth > MAX_DEPTH {
+            return Err("it is too deep");
+        }
+        let Some(node) = units.get(at..at + NODE_UNITS) else {
+            return Err("a node lies outside");
+        };
+        for slot in 0..WIDTH {
+            let child = ChildRef(node[CHILD_ROW].bits()[slot]);
+            if child == ChildRef::NONE {
+                // Rays test all eight boxes.
+                let lows = [0, 2, 4].map(|row| node[row].0[slot]);
+                let highs = [1, 3, 5].map(|row| node[row].0[slot]);
+                if lows != [f32::INFINITY; 3] || highs != [f32::NEG_INFINITY; 3] {
+                    return Err("a child that does not exist has a box");
+                }
+            } else if child.is_leaf() {
+                let words = units.get(child.unit()..).unwrap_or_default();
+                check_meshlet(bytemuck::cast_slice(words))?;
+            } else {
+                open.push((child.unit(), level + 1));
+            }
+        }
+    }
+    Ok(depth)
+}
+
+/// Checks the meshlet at the start of `words`: all that [`super::expand`] reads of it.
+fn check_meshlet(words: &[u32]) -> Result<(), &'static str> {
+    if words.len() < HEADER_WORDS {
+        return Err("a meshlet lies outside");
+    }
+    let header = Header::read(words);
+    let in_range = header.nodes as usize <= MAX_NODES
+        && header.leaves as usize <= MAX_LEAVES
+        && header.id_bits <= u32::BITS
+        && header.index_bits <= MAX_INDEX_BITS
+        && header.lattice.exponents.iter().all(|e| EXPONENTS.contains(e))
+        && header.axes.iter().all(|axis| axis.bits <= u32::BITS);
+    if !in_range {
+        return Err("the header of a meshlet is out of range");
+    }
+    let mut at = check_nodes(words, &header)?;
+
+    // ---- Vertices and numbers, in bits. A number is read with the word after its first.
+    at *= 32;
+    let indices = at;
+    at += (header.triangles * (3 * header.index_bits + header.id_bits)) as usize;
+    let mut axes: Vec<(Axis, usize)> = Vec::with_capacity(3);
+    for axis in header.axes {
+        axes.push((axis, at));
+        (_, at) = Coordinates::at(&axis, header.vertices, at);
+    }
+    if at / 32 + 2 > words.len() {
+        return Err("the numbers of a meshlet end outside");
+    }
+    for corner in 0..3 * header.triangles {
+        let at = indices + (corner * header.index_bits) as usize;
+        if bits::read(words, at, header.index_bits) >= header.vertices {
+            return Err("a triangle has a vertex that does not exist");
+        }
+    }
+    for (axis, at) in axes.iter().filter(|(axis, _)| axis.entries != 0) {
+        let numbers = at + axis.value_bits() as usize;
+        for vertex in 0..header.vertices {
+            let at = numbers + (vertex * axis.number_bits()) as usize;
+            if bits::read(words, at, axis.number_bits()) >= axis.entries {
+                return Err("a vertex has a coordinate that does not exist");
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Checks the small tree of a meshlet, and returns the word behind it.
+fn check_nodes(words: &[u32], header: &Header) -> Result<usize, &'static str> {
+    let (mut at, mut nodes, mut leaves, mut triangles) = (HEADER_WORDS, 1, 0, 0);
+    for node in 0..header.nodes {
+        let Some(&kinds) = words.get(at) else { return Err("the nodes of a meshlet end outside") };
+        let mut count = 0;
+        for slot in 0..WIDTH {
+            match kinds >> (4 * slot) & 15 {
+                NONE => break,
+                NODE => nodes += 1,
+                kind if kind < 4 => {
+                    leaves += 1;
+                    triangles += kind + 1;
+                }
+                _ => return Err("a child in a meshlet is of no kind"),
+            }
+            count += 1;
+        }
+        // Nodes come after those that name them.
+        if node + 1 < header.nodes && nodes <= node + 1 {
+            return Err("a node of a meshlet has no parent");
+        }
+        at += 1 + (6usize * count).div_ceil(4);
+    }
+    if (nodes, leaves, triangles) != (header.nodes, header.leaves, header.triangles) {
+        return Err("the nodes of a meshlet do not agree with its header");
+    }
+    if at > words.len() { Err("the nodes of a meshlet end outside") } else { Ok(at) }
+}

@@ -1,0 +1,149 @@
+//! The pages in memory: those that rays have used last, within a budget.
+//!
+//! Each page has a lock, so that a page is read once although several threads wait for it. What
+//! leaves is decided by a second chance: pages stand in a queue, and one that was used since it was
+//! looked at last goes to the end. Threads keep the last few pages that they used besides, so that
+//! most rays take no lock.
+
+use super::page::Page;
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
+
+/// Pages that each thread keeps.
+const RECENT: usize = 16;
+
+type RecentPages = [Option<(u64, u32, Arc<Page>)>; RECENT];
+
+thread_local! {
+    static RECENTLY_USED: RefCell<RecentPages> = const { RefCell::new([const { None }; RECENT]) };
+}
+
+/// A place for a page.
+#[derive(Default)]
+struct Slot {
+    page: Mutex<Option<Arc<Page>>>,
+    /// Whether it was used since it was looked at last.
+    used: AtomicBool,
+}
+
+/// The pages of one mesh.
+pub(super) struct PageCache {
+    /// Different for any two meshes of a process.
+    key: u64,
+    slots: Vec<Slot>,
+    /// The pages that are in memory.
+    queue: Mutex<VecDeque<u32>>,
+    budget: usize,
+    bytes: AtomicUsize,
+    peak: AtomicUsize,
+    reads: AtomicU64,
+}
+
+/// What the pages of a mesh take.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct PageUse {
+    /// Bytes of the pages in memory.
+    pub bytes: usize,
+    /// The most that they took since the file was opened.
+    pub peak: usize,
+    /// Pages that were read, those that were read again included.
+    pub reads: u64,
+}
+
+/// The contents of a lock. What a panic left in it is whole: it is only ever replaced.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl PageCache {
+    pub(super) fn new(key: u64, pages: usize, budget: usize) -> PageCache {
+        PageCache {
+            key,
+            slots: (0..pages).map(|_| Slot::default()).collect(),
+            queue: Mutex::new(VecDeque::new()),
+            budget,
+            bytes: AtomicUsize::new(0),
+            peak: AtomicUsize::new(0),
+            reads: AtomicU64::new(0),
+        }
+    }
+
+    pub(super) fn page_use(&self) -> PageUse {
+        PageUse {
+            bytes: self.bytes.load(Ordering::Relaxed),
+            peak: self.peak.load(Ordering::Relaxed),
+            reads: self.reads.load(Ordering::Relaxed),
+        }
+    }
+
+    /// Calls `work` with page `number`, which `read` reads where it is not in memory. `None` when
+    /// it cannot be read.
+    pub(super) fn with<R>(
+        &self,
+        number: u32,
+        read: impl FnOnce() -> Option<Page>,
+        work: impl FnOnce(&Page) -> R,
+    ) -> Option<R> {
+        let recent = RECENTLY_USED.with_borrow(|pages| match &pages[number as usize % RECENT] {
+            Some((key, page, held)) if (*key, *page) == (self.key, number) => Some(held.clone()),
+            _ => None,
+        });
+        let page = match recent {
+            Some(page) => page,
+            None => {
+                let page = self.page(number, read)?;
+                let held = Some((self.key, number, page.clone()));
+                RECENTLY_USED.with_borrow_mut(|pages| pages[number as usize % RECENT] = held);
+                page
+            }
+        };
+        Some(work(&page))
+    }
+
+    fn page(&self, number: u32, read: impl FnOnce() -> Option<Page>) -> Option<Arc<Page>> {
+        let slot = self.slots.get(number as usize)?;
+        slot.used.store(true, Ordering::Relaxed);
+        let mut held = lock(&slot.page);
+        if let Some(page) = &*held {
+            return Some(page.clone());
+        }
+        let page = Arc::new(read()?);
+        *held = Some(page.clone());
+        self.reads.fetch_add(1, Ordering::Relaxed);
+        let bytes = self.bytes.fetch_add(page.bytes(), Ordering::Relaxed) + page.bytes();
+        let mut queue = lock(&self.queue);
+        queue.push_back(number);
+        self.make_room(&mut queue, bytes);
+        self.peak.fetch_max(self.bytes.load(Ordering::Relaxed), Ordering::Relaxed);
+        Some(page)
+    }
+
+    /// Removes pages until the budget is kept, or each has been looked at twice. Never waits for
+    /// the lock of a page: whoever holds it may wait for the queue.
+    fn make_room(&self, queue: &mut VecDeque<u32>, mut bytes: usize) {
+        for _ in 0..2 * queue.len() {
+            if bytes <= self.budget {
+                return;
+            }
+            let Some(number) = queue.pop_front() else { return };
+            let slot = &self.slots[number as usize];
+            let mut held = match slot.page.try_lock() {
+                Ok(held) => held,
+                Err(TryLockError::Poisoned(held)) => held.into_inner(),
+                Err(TryLockError::WouldBlock) => {
+                    queue.push_back(number);
+                    continue;
+                }
+            };
+            if slot.used.swap(false, Ordering::Relaxed) {
+                queue.push_back(number);
+                continue;
+            }
+            let freed = held.take().map_or(0, |page| page.bytes());
+            bytes = self.bytes.fetch_sub(freed, Ordering::Relaxed) - freed;
+        }
+    }
+}

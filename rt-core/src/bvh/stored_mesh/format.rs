@@ -1,0 +1,176 @@
+//! The form of the file. All numbers are little-endian.
+//!
+//! ```text
+//! byte 0     header: 128 bytes
+//!   0        the letters RTSVMESH
+//!   8        u32 version, u32 checksum of the header with zero in this place
+//!   16       u64 length of the file, u64 byte of the table, u64 pages, u64 triangles,
+//!            u64 triangles that were left out
+//!   56       3 f64 origin
+//!   80       3 f32 smallest and 3 f32 largest coordinates of the boxes
+//!   104      u32 checksum of the table; zeros
+//! byte 128   pages, each a compact tree ([`crate::bvh::compact`]) of whole 32-byte units
+//! at the end the table: 64 bytes for each page
+//!   0        u64 byte of the page, u64 number of its triangle 0
+//!   16       u32 units, u32 triangles, u32 depth, u32 checksum
+//!   32       3 f32 smallest and 3 f32 largest coordinates; zeros
+//! ```
+//!
+//! Checksums are CRC-32 (IEEE 802.3). The header is written last: a file without it was not
+//! finished.
+
+use crate::math::Aabb;
+use glam::{DVec3, Vec3};
+
+pub(super) const MAGIC: &[u8; 8] = b"RTSVMESH";
+pub(super) const VERSION: u32 = 1;
+pub(super) const HEADER_BYTES: usize = 128;
+pub(super) const ENTRY_BYTES: usize = 64;
+/// Bytes of a unit of a page.
+pub(super) const UNIT_BYTES: u64 = 32;
+
+/// The checksum of all parts.
+pub(super) fn checksum(bytes: &[u8]) -> u32 {
+    crc32fast::hash(bytes)
+}
+
+/// What the header says.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Header {
+    pub(super) length: u64,
+    pub(super) table: u64,
+    pub(super) pages: u64,
+    pub(super) triangles: u64,
+    pub(super) skipped: u64,
+    pub(super) origin: DVec3,
+    pub(super) bounds: Aabb,
+    pub(super) table_checksum: u32,
+}
+
+/// A page in the table.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct PageEntry {
+    pub(super) offset: u64,
+    /// Number of the triangle with the number 0 in the page.
+    pub(super) first: u64,
+    pub(super) units: u32,
+    pub(super) triangles: u32,
+    pub(super) depth: u32,
+    pub(super) checksum: u32,
+    pub(super) bounds: Aabb,
+}
+
+/// Why bytes are no header.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum NoHeader {
+    OtherFile,
+    OtherVersion(u32),
+    Damaged,
+}
+
+/// Numbers at fixed places.
+struct Fields<'b>(&'b mut [u8]);
+
+impl Fields<'_> {
+    fn put<const N: usize>(&mut self, at: usize, bytes: [u8; N]) {
+        self.0[at..at + N].copy_from_slice(&bytes);
+    }
+
+    fn put_box(&mut self, at: usize, b: Aabb) {
+        for (i, x) in b.min.to_array().into_iter().chain(b.max.to_array()).enumerate() {
+            self.put(at + 4 * i, x.to_le_bytes());
+        }
+    }
+}
+
+fn get<const N: usize>(bytes: &[u8], at: usize) -> [u8; N] {
+    std::array::from_fn(|i| bytes[at + i])
+}
+
+fn get_u32(bytes: &[u8], at: usize) -> u32 {
+    u32::from_le_bytes(get(bytes, at))
+}
+
+fn get_u64(bytes: &[u8], at: usize) -> u64 {
+    u64::from_le_bytes(get(bytes, at))
+}
+
+fn get_box(bytes: &[u8], at: usize) -> Aabb {
+    let corner =
+        |at: usize| Vec3::from_array([0, 4, 8].map(|i| f32::from_le_bytes(get(bytes, at + i))));
+    Aabb { min: corner(at), max: corner(at + 12) }
+}
+
+impl Header {
+    pub(super) fn bytes(&self) -> [u8; HEADER_BYTES] {
+        let mut bytes = [0; HEADER_BYTES];
+        let mut fields = Fields(&mut bytes);
+        fields.put(0, *MAGIC);
+        fields.put(8, VERSION.to_le_bytes());
+        let numbers = [self.length, self.table, self.pages, self.triangles, self.skipped];
+        for (i, number) in numbers.into_iter().enumerate() {
+            fields.put(16 + 8 * i, number.to_le_bytes());
+        }
+        for (i, x) in self.origin.to_array().into_iter().enumerate() {
+            fields.put(56 + 8 * i, x.to_le_bytes());
+        }
+        fields.put_box(80, self.bounds);
+        fields.put(104, self.table_checksum.to_le_bytes());
+        let sum = checksum(&bytes);
+        Fields(&mut bytes).put(12, sum.to_le_bytes());
+        bytes
+    }
+
+    pub(super) fn read(bytes: &[u8; HEADER_BYTES]) -> Result<Header, NoHeader> {
+        if bytes[..8] != *MAGIC {
+            return Err(NoHeader::OtherFile);
+        }
+        let version = get_u32(bytes, 8);
+        if version != VERSION {
+            return Err(NoHeader::OtherVersion(version));
+        }
+        let mut without_sum = *bytes;
+        without_sum[12..16].fill(0);
+        if checksum(&without_sum) != get_u32(bytes, 12) {
+            return Err(NoHeader::Damaged);
+        }
+        Ok(Header {
+            length: get_u64(bytes, 16),
+            table: get_u64(bytes, 24),
+            pages: get_u64(bytes, 32),
+            triangles: get_u64(bytes, 40),
+            skipped: get_u64(bytes, 48),
+            origin: DVec3::from_array([56, 64, 72].map(|at| f64::from_le_bytes(get(bytes, at)))),
+            bounds: get_box(bytes, 80),
+            table_checksum: get_u32(bytes, 104),
+        })
+    }
+}
+
+impl PageEntry {
+    pub(super) fn bytes(&self) -> [u8; ENTRY_BYTES] {
+        let mut bytes = [0; ENTRY_BYTES];
+        let mut fields = Fields(&mut bytes);
+        fields.put(0, self.offset.to_le_bytes());
+        fields.put(8, self.first.to_le_bytes());
+        let numbers = [self.units, self.triangles, self.depth, self.checksum];
+        for (i, number) in numbers.into_iter().enumerate() {
+            fields.put(16 + 4 * i, number.to_le_bytes());
+        }
+        fields.put_box(32, self.bounds);
+        bytes
+    }
+
+    /// The entry in the first [`ENTRY_BYTES`] of `bytes`.
+    pub(super) fn read(bytes: &[u8]) -> PageEntry {
+        PageEntry {
+            offset: get_u64(bytes, 0),
+            first: get_u64(bytes, 8),
+            units: get_u32(bytes, 16),
+            triangles: get_u32(bytes, 20),
+            depth: get_u32(bytes, 24),
+            checksum: get_u32(bytes, 28),
+            bounds: get_box(bytes, 32),
+        }
+    }
+}

@@ -1,0 +1,266 @@
+//! Reads the pages of a stored mesh as rays need them.
+
+use super::StoredMeshReport;
+use super::cache::{PageCache, PageUse};
+use super::error::StoredMeshError;
+use super::format::{
+    ENTRY_BYTES, HEADER_BYTES, Header, MAGIC, NoHeader, PageEntry, UNIT_BYTES, VERSION, checksum,
+};
+use super::page::{Page, PageHit};
+use crate::bvh::compact::new_key;
+use crate::bvh::layout::wide::Unit;
+use crate::bvh::traverse::single::{BOX_SLACK, safe_reciprocal};
+use crate::math::Aabb;
+use crate::ray::Ray;
+use crate::shapes::{Shape, ShapeHit, ShapeSurface, rounded_point};
+use fearless_simd::Level;
+use glam::DVec3;
+use std::fs::File;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+/// A mesh in a file, as a shape: its primitives are the pages of the file. Made by a
+/// [`super::StoredMeshWriter`], where an example is.
+///
+/// ```no_run
+/// use rt_core::bvh::StoredMesh;
+/// use rt_core::prelude::*;
+/// use std::sync::Arc;
+///
+/// let mesh = Arc::new(StoredMesh::open("flow.rtmesh", 2 << 30)?);
+/// let mut scene = SceneBuilder::new();
+/// scene.shape(mesh, Material::matte([0.7, 0.7, 0.7]));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct StoredMesh {
+    path: PathBuf,
+    file: File,
+    header: Header,
+    table: Vec<PageEntry>,
+    cache: PageCache,
+    level: Level,
+    /// The first page that could not be read, and why.
+    failure: OnceLock<String>,
+}
+
+impl StoredMesh {
+    /// Opens a file and reads the table of its pages. Pages in memory take at most `budget` bytes,
+    /// and the page at hand and the last 16 of each thread besides.
+    ///
+    /// # Errors
+    /// When the file cannot be read, is no stored mesh, has another version, was cut, or its header
+    /// or table is damaged.
+    pub fn open(path: impl AsRef<Path>, budget: usize) -> Result<StoredMesh, StoredMeshError> {
+        if cfg!(target_endian = "big") {
+            return Err(StoredMeshError::BigEndian);
+        }
+        let path = path.as_ref().to_path_buf();
+        let io = |action| {
+            let path = path.clone();
+            move |source| StoredMeshError::Io { path, action, source }
+        };
+        let file = File::open(&path).map_err(io("open it"))?;
+        let found = file.metadata().map_err(io("look at it"))?.len();
+        let mut bytes = [0; HEADER_BYTES];
+        if found < HEADER_BYTES as u64 {
+            return Err(StoredMeshError::NotAStoredMesh { path });
+        }
+        read_at(&file, &mut bytes, 0).map_err(io("read"))?;
+        let header = Header::read(&bytes).map_err(|e| match e {
+            NoHeader::OtherFile => StoredMeshError::NotAStoredMesh { path: path.clone() },
+            NoHeader::OtherVersion(found) => {
+                StoredMeshError::Version { path: path.clone(), found, expected: VERSION }
+            }
+            NoHeader::Damaged => damaged(&path, "the header", 0, WRONG_CHECKSUM),
+        })?;
+        if header.length != found {
+            return Err(StoredMeshError::Length { path, found, expected: header.length });
+        }
+        let at = header.table;
+        let bad_table = |reason: &str| damaged(&path, "the table of pages", at, reason);
+        let bytes = header.pages.checked_mul(ENTRY_BYTES as u64);
+        if header.pages >= u64::from(u32::MAX)
+            || bytes.and_then(|bytes| at.checked_add(bytes)) != Some(found)
+        {
+            return Err(bad_table("it does not end where the file does"));
+        }
+        let mut bytes = vec![0; header.pages as usize * ENTRY_BYTES];
+        read_at(&file, &mut bytes, at).map_err(io("read"))?;
+        if checksum(&bytes) != header.table_checksum {
+            return Err(bad_table(WRONG_CHECKSUM));
+        }
+        let table: Vec<PageEntry> = bytes.chunks_exact(ENTRY_BYTES).map(PageEntry::read).collect();
+        for (number, page) in table.iter().enumerate() {
+            let end = u64::from(page.units) * UNIT_BYTES;
+            if page.offset.checked_add(end).is_none_or(|end| end > at) {
+                return Err(bad_table(&format!("page {number} lies outside")));
+            }
+        }
+        let cache = PageCache::new(new_key(), table.len(), budget);
+        let (level, failure) = (Level::new(), OnceLock::new());
+        Ok(StoredMesh { path, file, header, table, cache, level, failure })
+    }
+
+    /// Whether a file that starts with these bytes, 8 at least, is a stored mesh of any version.
+    pub fn recognizes(start: &[u8]) -> bool {
+        start.starts_with(MAGIC)
+    }
+
+    /// What the file has.
+    pub fn report(&self) -> StoredMeshReport {
+        StoredMeshReport {
+            triangles: self.header.triangles,
+            skipped: self.header.skipped,
+            pages: self.header.pages,
+            bytes: self.header.length,
+        }
+    }
+
+    /// Bounds of all triangles relative to the origin, wider by a little; empty without any.
+    pub fn bounds_of_all(&self) -> Aabb {
+        self.header.bounds
+    }
+
+    /// What the pages in memory take.
+    pub fn page_use(&self) -> PageUse {
+        self.cache.page_use()
+    }
+
+    /// The number of the triangle, in the order in which the writer got them, that `ray` hits in
+    /// page `page`; the ray is relative to the mesh's origin. `None` when it hits none, or the page
+    /// cannot be read ([`StoredMesh::failure`]).
+    pub fn triangle(&self, page: u32, ray: &Ray) -> Option<u64> {
+        self.hit(page, ray).map(|hit| hit.triangle)
+    }
+
+    /// Why a page could not be read, the first time that this was so. Rays passed through it.
+    pub fn failure(&self) -> Option<&str> {
+        self.failure.get().map(String::as_str)
+    }
+
+    /// Calls `work` with a page. `None` when it cannot be read.
+    fn with_page<R>(&self, number: u32, work: impl FnOnce(&Page) -> R) -> Option<R> {
+        let read =
+            || self.read_page(number).map_err(|e| self.failure.get_or_init(|| e.to_string())).ok();
+        self.cache.with(number, read, work)
+    }
+
+    fn read_page(&self, number: u32) -> Result<Page, StoredMeshError> {
+        let entry = &self.table[number as usize];
+        let mut units = vec![Unit::ZERO; entry.units as usize];
+        let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut units);
+        read_at(&self.file, bytes, entry.offset).map_err(|source| StoredMeshError::Io {
+            path: self.path.clone(),
+            action: "read a page of it",
+            source,
+        })?;
+        let part = format!("page {number}");
+        let bad = |reason: &str| StoredMeshError::Damaged {
+            path: self.path.clone(),
+            part: "a page",
+            offset: entry.offset,
+            reason: format!("{part}: {reason}"),
+        };
+        if checksum(bytes) != entry.checksum {
+            return Err(bad(WRONG_CHECKSUM));
+        }
+        Page::of_units(units, entry).map_err(bad)
+    }
+
+    /// The triangle that the ray hits in a page.
+    fn hit(&self, page: u32, ray: &Ray) -> Option<PageHit> {
+        self.table.get(page as usize)?;
+        self.with_page(page, |page| page.triangle(self.level, ray)).flatten()
+    }
+}
+
+const WRONG_CHECKSUM: &str = "its checksum is wrong";
+
+fn damaged(path: &Path, part: &'static str, offset: u64, reason: &str) -> StoredMeshError {
+    StoredMeshError::Damaged { path: path.to_path_buf(), part, offset, reason: reason.into() }
+}
+
+/// Reads all of `bytes` from `offset` on, without a position that threads would share.
+#[cfg(unix)]
+fn read_at(file: &File, bytes: &mut [u8], offset: u64) -> io::Result<()> {
+    std::os::unix::fs::FileExt::read_exact_at(file, bytes, offset)
+}
+
+/// Reads all of `bytes` from `offset` on, without a position that threads would share.
+#[cfg(windows)]
+fn read_at(file: &File, mut bytes: &mut [u8], mut offset: u64) -> io::Result<()> {
+    while !bytes.is_empty() {
+        let read = std::os::windows::fs::FileExt::seek_read(file, bytes, offset)?;
+        if read == 0 {
+            return Err(io::ErrorKind::UnexpectedEof.into());
+        }
+        bytes = &mut bytes[read..];
+        offset += read as u64;
+    }
+    Ok(())
+}
+
+/// Whether a ray enters a box, which is wider than what it holds. As the traversal's test.
+fn enters(ray: &Ray, b: Aabb) -> bool {
+    let (mut near, mut far) = (ray.t_min, ray.t_max);
+    for axis in 0..3 {
+        let rcp = safe_reciprocal(ray.dir[axis]);
+        let [t1, t2] = [b.min[axis], b.max[axis]].map(|x| (x - ray.origin[axis]) * rcp);
+        near = near.max(t1.min(t2));
+        far = far.min(t1.max(t2) * BOX_SLACK);
+    }
+    near <= far
+}
+
+impl Shape for StoredMesh {
+    fn num_primitives(&self) -> usize {
+        self.table.len()
+    }
+
+    fn origin(&self) -> DVec3 {
+        self.header.origin
+    }
+
+    fn bounds(&self, page: u32) -> Aabb {
+        self.table[page as usize].bounds
+    }
+
+    fn closest(&self, page: u32, ray: &Ray) -> Option<ShapeHit> {
+        if !enters(ray, self.table[page as usize].bounds) {
+            return None;
+        }
+        let hit = self.with_page(page, |page| page.closest(self.level, ray)).flatten()?;
+        Some(ShapeHit { t: hit.t, u: hit.u, v: hit.v })
+    }
+
+    fn occluded(&self, page: u32, ray: &Ray) -> bool {
+        enters(ray, self.table[page as usize].bounds)
+            && self.with_page(page, |page| page.occluded(self.level, ray)).unwrap_or(false)
+    }
+
+    fn surface(&self, page: u32, hit: &ShapeHit, ray: &Ray) -> ShapeSurface {
+        let flat = |point, point_error, normal| ShapeSurface {
+            point,
+            point_error,
+            normal,
+            scalar: None,
+            color: None,
+        };
+        let Some(PageHit { corners, .. }) = self.hit(page, ray) else {
+            // The page could be read for the hit and cannot be read now: the render fails.
+            return flat(ray.at(hit.t), 0.0, -ray.dir.normalize_or_zero());
+        };
+        let [a, b, c] = corners.map(|p| p.as_dvec3());
+        let (e1, e2) = (b - a, c - a);
+        let p = a + e1 * f64::from(hit.u) + e2 * f64::from(hit.v);
+        // The sum lies in the triangle's plane for any weights, but for the rounding of f64.
+        let size = corners.iter().fold(0.0f32, |m, p| m.max(p.abs().max_element()));
+        let (point, point_error) = rounded_point(p, 16.0 * f64::EPSILON * f64::from(size));
+        flat(point, point_error, e1.cross(e2).normalize_or_zero().as_vec3())
+    }
+
+    fn failure(&self) -> Option<String> {
+        self.failure.get().cloned()
+    }
+}
