@@ -51,12 +51,18 @@ pub(crate) fn module(items: &[Item]) -> String {
     let mut out = String::from(
         "\"\"\"The interface of composite for Python: what rtsv_composite.h is for C, by ctypes.\n\n\
          Names have no prefix here: rtsv_composite_comm_free of C is comm_free. Calls raise Error\n\
-         instead of returning a status, and structures know their size. The library is found as\n\
-         librtsv_composite.so.0 by the dynamic linker, or where RTSV_COMPOSITE_LIBRARY says.\n\n\
+         instead of returning a status, and structures know their size. The library is the file that\n\
+         RTSV_COMPOSITE_LIBRARY names, else the one in ../lib beside this folder (an installation),\n\
+         else the one that the dynamic linker finds.\n\n\
          Made from the Rust sources by tests/interface: do not edit.\n\"\"\"\n\n\
-         import ctypes\nimport os\n\n\
-         _library = ctypes.CDLL(os.environ.get(\"RTSV_COMPOSITE_LIBRARY\", \
-         \"librtsv_composite.so.0\"))\n\
+         import ctypes\nimport os\n\n\n\
+         def _library_path():\n    \
+         name = \"librtsv_composite.so.ABI\"\n    \
+         here = os.path.dirname(os.path.realpath(__file__))\n    \
+         installed = os.path.join(here, \"..\", \"lib\", name)\n    \
+         named = os.environ.get(\"RTSV_COMPOSITE_LIBRARY\")\n    \
+         return named or (installed if os.path.exists(installed) else name)\n\n\n\
+         _library = ctypes.CDLL(_library_path())\n\
          Release = ctypes.CFUNCTYPE(None, ctypes.c_void_p)\n\n\n\
          class Error(RuntimeError):\n    \"\"\"A call that failed: its text, and its status.\"\"\"\n\n\
          \x20   def __init__(self, status):\n        super().__init__(last_error().decode())\n        \
@@ -67,6 +73,9 @@ pub(crate) fn module(items: &[Item]) -> String {
          super().__init__(**members)\n        if hasattr(self, \"struct_bytes\"):\n            \
          self.struct_bytes = ctypes.sizeof(self)\n\n\n",
     );
+    let abi = items.iter().find(|i| i.name == "RTSV_COMPOSITE_ABI").map(|i| &i.kind);
+    let Some(Kind::Constant(abi)) = abi else { panic!("the interface has no number") };
+    out = out.replace("ABI\"\n", &format!("{abi}\"\n"));
     for Item { name, about, kind } in items {
         match kind {
             Kind::Constant(value) => {
