@@ -67,8 +67,7 @@ impl<P: Composite> Compositor<P> {
         for (number, tile) in tiles.iter().enumerate() {
             self.options.destination = Destination::Rank(tile.rank);
             self.options.final_barrier = barrier && number + 1 == tiles.len();
-            let done =
-                frame.window(tile.pixels).and_then(|window| self.composite(comm, &window));
+            let done = frame.window(tile.pixels).and_then(|window| self.composite(comm, &window));
             match done {
                 Ok(output) => shown.extend(output.image.map(|image| (number, image))),
                 Err(error) => {

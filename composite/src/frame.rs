@@ -239,13 +239,7 @@ impl<'a, P: PixelFormat> Frame<'a, P> {
 
     /// Pixels of `bounds`, which must lie within the image.
     pub(crate) fn view(&self, bounds: Rect) -> View<'a, P> {
-        View {
-            bounds,
-            origin: (0, 0),
-            stride: self.row_px,
-            colors: self.color,
-            depths: self.depth,
-        }
+        View { bounds, origin: (0, 0), stride: self.row_px, colors: self.color, depths: self.depth }
     }
 }
 
@@ -464,7 +458,11 @@ mod tests {
         type Pixel = PremultipliedPixel<[u8; 4]>;
         let color = [[1_u8; 4]; 12];
         let text = |width, rows, row_px: usize| match Frame::<Pixel>::with_rows(
-            width, rows, row_px, &color, &[],
+            width,
+            rows,
+            row_px,
+            &color,
+            &[],
         ) {
             Ok(frame) => format!("{} pixels", frame.len()),
             Err(error) => error.to_string(),

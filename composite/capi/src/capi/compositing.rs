@@ -408,4 +408,3 @@ pub extern "C" fn rtsv_composite_compositor_free(
 ) -> RtsvCompositeStatus {
     free::<CompositorObject, _>(compositor)
 }
-

@@ -93,14 +93,14 @@ pub(crate) fn remove<T: Handled>(handle: usize) -> Result<T, Failure> {
 }
 
 fn busy(name: &str) -> Failure {
-    Failure::new(
-        RTSV_COMPOSITE_BUSY,
-        format!("a call with this {name} has not returned"),
-    )
+    Failure::new(RTSV_COMPOSITE_BUSY, format!("a call with this {name} has not returned"))
 }
 
 fn other_kind(found: &str, wanted: &str) -> Failure {
-    Failure::new(RTSV_COMPOSITE_HANDLE, format!("the handle is that of a {found}, not of a {wanted}"))
+    Failure::new(
+        RTSV_COMPOSITE_HANDLE,
+        format!("the handle is that of a {found}, not of a {wanted}"),
+    )
 }
 
 fn slot_of(handle: usize, wanted: &str) -> Result<Rc<Slot>, Failure> {

@@ -1,5 +1,6 @@
 //! Structures and arrays in memory of the program: read at the calls, never kept.
 
+use super::scene_types::*;
 use super::status::Failure;
 use super::types::*;
 use std::ffi::{CStr, c_char, c_void};

@@ -5,6 +5,7 @@ use super::group::{collective, free};
 use super::handles::{self, Handled};
 use super::memory::{check_pointer, check_size, flag, put, read, unused};
 use super::scene::SceneObject;
+use super::scene_types::*;
 use super::status::{Failure, c_text, guarded};
 use super::types::*;
 use composite::render::{DataParallel, FrameOptions, RankReport, RankScene, SecondaryRayPolicy};
@@ -210,8 +211,10 @@ fn render_options_of(v: &RtsvCompositeView) -> Result<RenderOptions, Failure> {
     let max_bounces = match v.max_bounces {
         -1 => None,
         most => Some(u32::try_from(most).map_err(|_| {
-            Failure::value(format!("max_bounces of RtsvCompositeView is {most}: give 0 or more, \
-                                    or -1"))
+            Failure::value(format!(
+                "max_bounces of RtsvCompositeView is {most}: give 0 or more, \
+                                    or -1"
+            ))
         })?),
     };
     let depth = flag(v.depth, "depth of RtsvCompositeView")?;

@@ -3,6 +3,7 @@
 use super::group::free;
 use super::handles::{self, Handled};
 use super::memory::{Owners, check_size, flag, put, read, text, unused};
+use super::scene_types::*;
 use super::status::{Failure, c_text, guarded};
 use super::tuples::{FLOATS, INDICES, Tuples};
 use super::types::*;
@@ -253,8 +254,7 @@ pub unsafe extern "C" fn rtsv_composite_scene_mesh(
     guarded(|| {
         // SAFETY: the caller's promise, also below.
         let m = unsafe { read(mesh, "mesh") }?;
-        let _owners =
-            Owners::of(&[m.positions, m.triangles, m.normals, m.colors, m.places]);
+        let _owners = Owners::of(&[m.positions, m.triangles, m.normals, m.colors, m.places]);
         handles::with(scene.addr(), |object: &mut SceneObject| {
             // SAFETY: as above.
             let name = unsafe { text(m.name, "name") }?;
@@ -283,7 +283,9 @@ pub unsafe extern "C" fn rtsv_composite_scene_mesh(
                     positions: relative(positions, origin),
                     indices: triangles.map_or(Vec::new(), |t| t.values()),
                     normals: normals.map(|n| {
-                        Attribute::per_vertex(n.values().into_iter().map(Vec3::from_array).collect())
+                        Attribute::per_vertex(
+                            n.values().into_iter().map(Vec3::from_array).collect(),
+                        )
                     }),
                     colors: colors.map(|c| Attribute { per, values: c.values() }),
                     ..TriMesh::default()
@@ -329,7 +331,9 @@ pub unsafe extern "C" fn rtsv_composite_scene_spheres(
             let places = tuples(&s.places, "places", 12, &[RTSV_COMPOSITE_F64], PLACES_OWN)?;
             // SAFETY: as above.
             let radii = match radii {
-                Some(radii) => Radii::Each(unsafe { radii.values() }.into_iter().map(|[r]| r).collect()),
+                Some(radii) => {
+                    Radii::Each(unsafe { radii.values() }.into_iter().map(|[r]| r).collect())
+                }
                 None => Radii::Common(s.radius),
             };
             let origin = DVec3::from(s.origin);
@@ -397,8 +401,6 @@ pub unsafe extern "C" fn rtsv_composite_scene_copies(
 
 /// Frees a scene; renderers that were made of it go on. Null is allowed.
 #[unsafe(no_mangle)]
-pub extern "C" fn rtsv_composite_scene_free(
-    scene: *mut RtsvCompositeScene,
-) -> RtsvCompositeStatus {
+pub extern "C" fn rtsv_composite_scene_free(scene: *mut RtsvCompositeScene) -> RtsvCompositeStatus {
     free::<SceneObject, _>(scene)
 }

@@ -1,6 +1,7 @@
 //! Arrays of tuples: numbers of any kind and stride, converted to what the renderer keeps.
 
 use super::memory::{at, is_addressable};
+use super::scene_types::*;
 use super::status::Failure;
 use super::types::*;
 
@@ -64,8 +65,10 @@ impl<'a> Tuples<'a> {
         let stride = if array.stride_bytes == 0 { tuple as i64 } else { array.stride_bytes };
         if !is_addressable(&[array.count], &[stride], tuple) {
             let count = array.count;
-            return fault(format!("{count} tuples that are {stride} bytes apart: no memory is so \
-                                  large"));
+            return fault(format!(
+                "{count} tuples that are {stride} bytes apart: no memory is so \
+                                  large"
+            ));
         }
         Ok(Some(Tuples { array, stride, what }))
     }

@@ -3,6 +3,7 @@
 use super::handles;
 use super::memory::{Owners, at, flag, is_addressable, put, read, text, unused};
 use super::scene::SceneObject;
+use super::scene_types::*;
 use super::status::{Failure, guarded};
 use super::tuples::{FLOATS, NUMBERS, Tuples};
 use super::types::*;
@@ -107,7 +108,9 @@ pub unsafe extern "C" fn rtsv_composite_scene_brick(
             let points = nx.checked_mul(ny).and_then(|n| n.checked_mul(nz));
             if points != Some(b.values.count) {
                 let (dims, count) = (b.dims, b.values.count);
-                return Err(fault(format!("{count} values for {dims:?} points: give one for each")));
+                return Err(fault(format!(
+                    "{count} values for {dims:?} points: give one for each"
+                )));
             }
             let row = Tuples::new(&b.values, "values", 1, NUMBERS).map_err(|f| fault(f.text))?;
             let Some(values) = row else { return Ok(()) };

@@ -50,9 +50,9 @@ static RtsvCompositeFrame frame_of(const void* data, int64_t row_bytes) {
 
 /* Whether an image has the pixels of the whole one at its place. */
 static int is_part(const RtsvCompositeImage* image) {
-  const Pixel* colors = image->color;
+  const float* colors = image->color;
   for (uint32_t y = 0; y < image->height; ++y)
-    if (memcmp(colors + y * image->width, whole[image->y + y] + image->x,
+    if (memcmp(colors + 4 * y * image->width, whole[image->y + y] + image->x,
                image->width * sizeof(Pixel)))
       return 0;
   return 1;

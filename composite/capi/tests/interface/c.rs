@@ -69,13 +69,13 @@ pub(crate) fn header(items: &[Item]) -> String {
             Kind::Function { arguments, result } => {
                 let start = format!("{} {name}(", c_type(result));
                 let arguments: Vec<String> = arguments.iter().map(declaration).collect();
-                let arguments =
-                    if arguments.is_empty() { "void".to_owned() } else { arguments.join(", ") };
-                let one = format!("{start}{arguments});");
-                let broken = wrapped(&arguments, 94).join("\n    ");
+                let one = match arguments.len() {
+                    0 => format!("{start}void);"),
+                    _ => format!("{start}{});", arguments.join(", ")),
+                };
                 match one.len() <= 100 {
                     true => writeln!(out, "{one}"),
-                    false => writeln!(out, "{start}\n    {broken});"),
+                    false => writeln!(out, "{start}\n    {});", arguments.join(",\n    ")),
                 }
             }
         }

@@ -11,12 +11,13 @@ use std::path::Path;
 
 /// Hash of structures, constants and calls, without what is said of them. When it changes: additions
 /// keep RTSV_COMPOSITE_ABI; whatever breaks programs raises it, in `types.rs` and `build.rs`.
-const INTERFACE: u32 = 0;
+const INTERFACE: u32 = 1_267_711_997;
 
 /// The interface, in the order of a program.
 fn interface() -> Vec<Item> {
     let sources = [
         include_str!("../../src/capi/types.rs"),
+        include_str!("../../src/capi/scene_types.rs"),
         include_str!("../../src/capi/status.rs"),
         include_str!("../../src/capi/group.rs"),
         include_str!("../../src/capi/compositing.rs"),

@@ -62,8 +62,8 @@ pub(crate) fn items(source: &str) -> Vec<Item> {
         } else if line == "#[unsafe(no_mangle)]" {
             let end = i + lines[i..].iter().position(|l| l.ends_with('{')).expect("a body");
             let text = lines[i + 1..=end].iter().map(|l| l.trim()).collect::<Vec<_>>().join(" ");
-            let (name, rest) = text.split_once(" fn ").expect("a function").1.split_once('(')
-                .expect("arguments");
+            let (name, rest) =
+                text.split_once(" fn ").expect("a function").1.split_once('(').expect("arguments");
             let (arguments, result) = rest.rsplit_once(") -> ").expect("a result");
             let arguments = arguments.split(',').map(str::trim).filter(|a| !a.is_empty());
             let arguments = arguments.map(|a| field(a, &mut Vec::new())).collect();
@@ -139,7 +139,7 @@ pub(crate) fn layout(rust: &str, all: &[Item]) -> (usize, usize) {
             let Some(Kind::Structure(fields)) = structure.map(|i| &i.kind) else {
                 panic!("no layout of `{name}`")
             };
-            let (bytes, align) = fields.iter().fold((0, 1), |(sum, most), field| {
+            let (bytes, align) = fields.iter().fold((0_usize, 1), |(sum, most), field| {
                 let (bytes, align) = layout(&field.rust, all);
                 (sum.next_multiple_of(align) + bytes, most.max(align))
             });

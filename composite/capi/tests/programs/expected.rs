@@ -2,7 +2,9 @@
 //! those of the examples.
 
 use composite::render::{DataParallel, FrameOptions, RankScene};
-use composite::{Communicator, Compositor, DepthPixel, Frame, Options, PremultipliedPixel, threads};
+use composite::{
+    Communicator, Compositor, DepthPixel, Frame, Options, PremultipliedPixel, threads,
+};
 use rt_core::camera::Camera;
 use rt_core::glam::{DVec3, Vec3};
 use rt_core::light::Light;
@@ -30,7 +32,8 @@ fn drawn_by(rank: u32) -> Buffers {
     let (mut colors, mut depths, mut blended) = (Vec::new(), Vec::new(), Vec::new());
     for (y, x) in (0..SIZE.1).flat_map(|y| (0..SIZE.0).map(move |x| (y, x))) {
         let drawn = ((x + 5 * rank) / 16 + y / 16) % 2 == 0;
-        let channels = [(60 * rank + 40) % 256, 2 * x, 3 * y, 256].map(|c| if drawn { c } else { 0 });
+        let channels =
+            [(60 * rank + 40) % 256, 2 * x, 3 * y, 256].map(|c| if drawn { c } else { 0 });
         colors.push(channels.map(|c| c.min(255) as u8));
         blended.push(channels.map(|c| c as f32 / 1024.0));
         depths.push(if drawn { ((x + 3 * y + 17 * rank) % 64) as f32 / 64.0 } else { 1.0 });
@@ -71,14 +74,10 @@ pub(crate) fn images(ranks: u32) -> Images {
         let (eye, target) = (DVec3::new(0.5, -1.5, 1.25), DVec3::new(0.5 * n, 2.0, 0.0));
         let aspect = f64::from(VIEW.0) / f64::from(VIEW.1);
         let angle = std::f64::consts::FRAC_PI_4;
-        let camera =
-            Camera::perspective(eye * n, target, DVec3::Z, angle, aspect, [0.01, 1000.0]);
+        let camera = Camera::perspective(eye * n, target, DVec3::Z, angle, aspect, [0.01, 1000.0]);
         let options = RenderOptions::new(VIEW.0, VIEW.1);
-        let picture = renderer.expect("a scene").frame(
-            &mut comm,
-            &camera.expect("a camera"),
-            &options,
-        );
+        let picture =
+            renderer.expect("a scene").frame(&mut comm, &camera.expect("a camera"), &options);
         (depth, alpha, picture.expect("a picture").frame)
     });
     let first = outputs.into_iter().next().expect("a rank").expect("no panic");

@@ -16,12 +16,7 @@ pub(crate) struct Mpi {
 }
 
 pub(crate) const MPIS: [Mpi; 2] = [
-    Mpi {
-        name: "openmpi",
-        launcher: "RTSV_MPIRUN",
-        c: "RTSV_MPICC",
-        fortran: "RTSV_MPIFORT",
-    },
+    Mpi { name: "openmpi", launcher: "RTSV_MPIRUN", c: "RTSV_MPICC", fortran: "RTSV_MPIFORT" },
     Mpi {
         name: "mpich",
         launcher: "RTSV_MPIRUN_MPICH",
@@ -123,10 +118,27 @@ impl Mpi {
         command.envs(ENVIRONMENT).env("RUST_BACKTRACE", "0").env("PYTHONDONTWRITEBYTECODE", "1");
         command.env("RTSV_COMPOSITE_LIBRARY", library().join("librtsv_composite.so"));
         command.env("PYTHONPATH", member().join("python"));
+        if self.name == "mpich" {
+            // The wheel of mpi4py has a module for each MPI, and looks for MPICH by the name of its
+            // own builds, which Debian's library does not have.
+            command.env("MPI4PY_MPIABI", "mpich").env("LD_LIBRARY_PATH", mpich_by_its_own_name());
+        }
         let output = command.output().expect("coreutils' timeout runs");
         assert!(output.status.code() != Some(124), "{words:?} did not end:\n{}", text(&output));
         Some(output)
     }
+}
+
+/// A folder with Debian's `libmpich.so.12` as `libmpi.so.12`.
+fn mpich_by_its_own_name() -> PathBuf {
+    let folder = scratch("mpich");
+    let library = format!("/usr/lib/{}-linux-gnu/libmpich.so.12", std::env::consts::ARCH);
+    let link = folder.join("libmpi.so.12");
+    // Elsewhere the library has that name already.
+    if Path::new(&library).is_file() && !link.exists() {
+        std::os::unix::fs::symlink(library, link).expect("a link");
+    }
+    folder
 }
 
 /// For more ranks than processors, as root in a container, on one machine.
