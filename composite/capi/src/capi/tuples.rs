@@ -3,7 +3,6 @@
 use super::memory::{at, is_addressable};
 use super::scene_types::*;
 use super::status::Failure;
-use super::types::*;
 
 /// An array whose description is sound.
 #[derive(Clone, Copy)]

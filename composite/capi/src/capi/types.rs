@@ -10,7 +10,8 @@ use std::ffi::c_void;
 /// rtsv_composite_library_version.
 pub const RTSV_COMPOSITE_VERSION: u32 = 0x0000_0100;
 
-/// The number in the library's name, librtsv_composite.so.0: a change that breaks programs raises it.
+/// The number in the library's name, librtsv_composite.so.0: a change that breaks programs raises
+/// it.
 pub const RTSV_COMPOSITE_ABI: u32 = 0;
 
 /// What a call returns: one of RTSV_COMPOSITE_OK and the statuses below.

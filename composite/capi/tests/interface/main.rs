@@ -9,8 +9,9 @@ mod python;
 use model::{Item, Kind};
 use std::path::Path;
 
-/// Hash of structures, constants and calls, without what is said of them. When it changes: additions
-/// keep RTSV_COMPOSITE_ABI; whatever breaks programs raises it, in `types.rs` and `build.rs`.
+/// Hash of structures, constants and calls, without what is said of them. When it changes:
+/// additions keep RTSV_COMPOSITE_ABI; whatever breaks programs raises it, in `types.rs` and
+/// `build.rs`.
 const INTERFACE: u32 = 1_267_711_997;
 
 /// The interface, in the order of a program.
