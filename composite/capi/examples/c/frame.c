@@ -98,7 +98,7 @@ int main(int argc, char **argv) {
   RtsvCompositeView view;
   check(rtsv_composite_view_init(&view, sizeof view));
   view.width = 320, view.height = 200;
-  view.eye[0] = 0.5 * ranks, view.eye[1] = -1.5 * ranks, view.eye[2] = 1.25 * ranks;
+  view.eye[0] = 0.5 * ranks, view.eye[1] = -0.625 * ranks, view.eye[2] = 0.5 * ranks;
   view.target[0] = 0.5 * ranks, view.target[1] = 2, view.target[2] = 0;
   view.up[1] = 0, view.up[2] = 1;
   RtsvCompositePicture picture = {.struct_bytes = sizeof picture};

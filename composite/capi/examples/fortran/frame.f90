@@ -76,7 +76,7 @@ program frame
   call check(rtsv_composite_view_init(view, c_sizeof(view)))
   view%width = 320
   view%height = 200
-  view%eye = [0.5d0*ranks, -1.5d0*ranks, 1.25d0*ranks]
+  view%eye = [0.5d0*ranks, -0.625d0*ranks, 0.5d0*ranks]
   view%target = [0.5d0*ranks, 2d0, 0d0]
   view%up = [0d0, 0d0, 1d0]
   call check(rtsv_composite_renderer_render(renderer, view, picture))

@@ -94,7 +94,7 @@ def main():
     rc.renderer_new(comm, scene, None, byref(renderer))
     rc.view_init(byref(view), sizeof(view))
     view.width, view.height = 320, 200
-    view.eye[:] = [0.5 * ranks, -1.5 * ranks, 1.25 * ranks]
+    view.eye[:] = [0.5 * ranks, -0.625 * ranks, 0.5 * ranks]
     view.target[:] = [0.5 * ranks, 2, 0]
     view.up[:] = [0, 0, 1]
     rc.renderer_render(renderer, byref(view), byref(picture))

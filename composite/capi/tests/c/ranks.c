@@ -25,9 +25,12 @@ static void fault_at(int line, const char* what) {
     CHECK(strstr(rtsv_composite_last_error(), words) != NULL);   \
   } while (0)
 
+/* A group. A rank that fails at once must not do so while others are still making it: they would
+ * learn the cause there. */
 static RtsvCompositeComm* group_of(MPI_Comm mpi) {
   RtsvCompositeComm* comm = NULL;
   FINE(rtsv_composite_comm_from_mpi(&mpi, sizeof mpi, &comm));
+  MPI_Barrier(mpi);
   return comm;
 }
 

@@ -71,7 +71,7 @@ pub(crate) fn images(ranks: u32) -> Images {
         let scene = scene_of(comm.rank() as u32);
         let renderer = DataParallel::distributed(&mut comm, scene, FrameOptions::default());
         let n = f64::from(ranks);
-        let (eye, target) = (DVec3::new(0.5, -1.5, 1.25), DVec3::new(0.5 * n, 2.0, 0.0));
+        let (eye, target) = (DVec3::new(0.5, -0.625, 0.5), DVec3::new(0.5 * n, 2.0, 0.0));
         let aspect = f64::from(VIEW.0) / f64::from(VIEW.1);
         let angle = std::f64::consts::FRAC_PI_4;
         let camera = Camera::perspective(eye * n, target, DVec3::Z, angle, aspect, [0.01, 1000.0]);
