@@ -330,10 +330,9 @@ pub unsafe extern "C" fn rtsv_composite_scene_spheres(
             let colors = tuples(&s.colors, "colors", 4, FLOATS, SPHERES_OWN)?;
             let places = tuples(&s.places, "places", 12, &[RTSV_COMPOSITE_F64], PLACES_OWN)?;
             // SAFETY: as above.
+            let radii = radii.map(|radii| unsafe { radii.values() });
             let radii = match radii {
-                Some(radii) => {
-                    Radii::Each(unsafe { radii.values() }.into_iter().map(|[r]| r).collect())
-                }
+                Some(radii) => Radii::Each(radii.into_iter().map(|[radius]| radius).collect()),
                 None => Radii::Common(s.radius),
             };
             let origin = DVec3::from(s.origin);

@@ -31,7 +31,7 @@ type Buffers = (Vec<[u8; 4]>, Vec<f32>, Vec<[f32; 4]>);
 fn drawn_by(rank: u32) -> Buffers {
     let (mut colors, mut depths, mut blended) = (Vec::new(), Vec::new(), Vec::new());
     for (y, x) in (0..SIZE.1).flat_map(|y| (0..SIZE.0).map(move |x| (y, x))) {
-        let drawn = ((x + 5 * rank) / 16 + y / 16) % 2 == 0;
+        let drawn = ((x + 5 * rank) / 16 + y / 16).is_multiple_of(2);
         let channels =
             [(60 * rank + 40) % 256, 2 * x, 3 * y, 256].map(|c| if drawn { c } else { 0 });
         colors.push(channels.map(|c| c.min(255) as u8));
