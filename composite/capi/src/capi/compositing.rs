@@ -329,7 +329,7 @@ pub unsafe extern "C" fn rtsv_composite_composite(
 }
 
 /// Collective: composites the frames of all ranks into the tiles of a display wall, which may
-/// overlap. All ranks give the same `count` tiles. images[k] is tile k on the rank that shows it,
+/// overlap. All ranks give the same `count` tiles. `images[k]` is tile k on the rank that shows it,
 /// and without pixels on the others. The destination of the options is not used.
 ///
 /// # Safety
