@@ -59,8 +59,9 @@ fn mutate(random: &mut Random, message: &mut Vec<u8>) {
 
 fn drawn_by(rank: usize) -> (Vec<[u8; 4]>, Vec<f32>) {
     let color = |k: usize| [rank as u8 + 1, k as u8, (k * rank) as u8, 255];
-    let depth =
-        |k: usize| if (k + rank) % 3 == 0 { 1.0 } else { (k * 7 + rank * 5) as f32 % 8.0 / 8.0 };
+    let depth = |k: usize| {
+        if (k + rank).is_multiple_of(3) { 1.0 } else { (k * 7 + rank * 5) as f32 % 8.0 / 8.0 }
+    };
     ((0..PIXELS).map(color).collect(), (0..PIXELS).map(depth).collect())
 }
 
