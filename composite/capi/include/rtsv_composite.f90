@@ -103,7 +103,8 @@ module rtsv_composite
   end type
   ! What one rank has drawn. The order of rows is free, and the same on all ranks. The planes
   ! are read before the call returns, and not copied where pixels have no gaps and are aligned,
-  ! rows ascend by whole pixels, and both planes have rows of one length.
+  ! rows ascend by whole pixels, and both planes have rows of one length. What lies between rows
+  ! must be readable.
   type, bind(c) :: RtsvCompositeFrame
     ! Size of this structure.
     integer(c_int64_t) :: struct_bytes = 96

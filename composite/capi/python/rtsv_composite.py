@@ -151,7 +151,8 @@ class Plane(_Structure):
 class Frame(_Structure):
     # What one rank has drawn. The order of rows is free, and the same on all ranks. The planes
     # are read before the call returns, and not copied where pixels have no gaps and are aligned,
-    # rows ascend by whole pixels, and both planes have rows of one length.
+    # rows ascend by whole pixels, and both planes have rows of one length. What lies between rows
+    # must be readable.
     _fields_ = [
         # Size of this structure.
         ("struct_bytes", ctypes.c_uint64),

@@ -140,7 +140,8 @@ pub struct RtsvCompositePlane {
 
 /// What one rank has drawn. The order of rows is free, and the same on all ranks. The planes are
 /// read before the call returns, and not copied where pixels have no gaps and are aligned, rows
-/// ascend by whole pixels, and both planes have rows of one length.
+/// ascend by whole pixels, and both planes have rows of one length. What lies between rows must be
+/// readable.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct RtsvCompositeFrame {
