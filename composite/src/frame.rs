@@ -13,6 +13,8 @@ use crate::simd::{Kernels, at_level};
 pub struct Frame<'a, P: PixelFormat> {
     width_px: u32,
     height_px: u32,
+    /// From one row to the next, in pixels of both planes.
+    row_px: usize,
     color: &'a [P::Color],
     depth: &'a [f32],
     bounds: Option<Rect>,
@@ -36,7 +38,7 @@ where
     ) -> Result<Self, CompositeError> {
         check_length("colour", width_px, height_px, color.len())?;
         check_length("depth", width_px, height_px, depth.len())?;
-        Ok(Self { width_px, height_px, color, depth, bounds: None, depth_range: None })
+        Ok(Self::of_planes(width_px, height_px, width_px as usize, color, depth))
     }
 }
 
@@ -54,7 +56,7 @@ where
         color: &'a [C],
     ) -> Result<Self, CompositeError> {
         check_length("colour", width_px, height_px, color.len())?;
-        Ok(Self { width_px, height_px, color, depth: &[], bounds: None, depth_range: None })
+        Ok(Self::of_planes(width_px, height_px, width_px as usize, color, &[]))
     }
 }
 
@@ -87,6 +89,76 @@ impl Rect {
 }
 
 impl<'a, P: PixelFormat> Frame<'a, P> {
+    fn of_planes(
+        width_px: u32,
+        height_px: u32,
+        row_px: usize,
+        color: &'a [P::Color],
+        depth: &'a [f32],
+    ) -> Self {
+        Self { width_px, height_px, row_px, color, depth, bounds: None, depth_range: None }
+    }
+
+    /// An image whose rows are `row_px` pixels apart in both planes: rows with padding, or a part
+    /// of a larger image. The last row may end with its last pixel. `depth` is empty for formats
+    /// without depth.
+    ///
+    /// # Errors
+    /// [`CompositeError::Options`] if rows overlap, or if a plane ends before the last pixel.
+    pub fn with_rows(
+        width_px: u32,
+        height_px: u32,
+        row_px: usize,
+        color: &'a [P::Color],
+        depth: &'a [f32],
+    ) -> Result<Self, CompositeError> {
+        if row_px < width_px as usize {
+            return Err(CompositeError::Options(format!(
+                "rows of {width_px} pixels are {row_px} pixels apart: give at least their width"
+            )));
+        }
+        let empty = width_px == 0 || height_px == 0;
+        let before_last = (height_px.max(1) as usize - 1).checked_mul(row_px);
+        let needed = before_last.and_then(|n| n.checked_add(width_px as usize));
+        let needed = if empty { Some(0) } else { needed };
+        let planes = [("colour", color.len(), true), ("depth", depth.len(), P::HAS_DEPTH)];
+        for (plane, found, is_needed) in planes {
+            if is_needed && needed.is_none_or(|needed| found < needed) {
+                return Err(CompositeError::Options(format!(
+                    "the {plane} plane holds {found} values, too few for {height_px} rows of \
+                     {width_px} pixels that are {row_px} apart: pass it up to its last pixel"
+                )));
+            }
+        }
+        Ok(Self::of_planes(width_px, height_px, row_px, color, depth))
+    }
+
+    /// A part of this frame as a frame of its own, without a copy: a tile of a display wall. What
+    /// is known of its bounds and its depth range holds for the part too.
+    ///
+    /// # Errors
+    /// [`CompositeError::Options`] if `window` reaches outside the image.
+    pub fn window(self, window: Rect) -> Result<Self, CompositeError> {
+        Rect::of_size(self.width_px, self.height_px).must_contain(&window)?;
+        let window = if window.is_empty() { Rect::EMPTY } else { window };
+        let first = window.y0 as usize * self.row_px + window.x0 as usize;
+        let in_window = |bounds: Rect| {
+            let Rect { x0, y0, x1, y1 } = bounds.intersection(&window);
+            if x1 <= x0 {
+                return Rect::EMPTY;
+            }
+            Rect { x0: x0 - window.x0, y0: y0 - window.y0, x1: x1 - window.x0, y1: y1 - window.y0 }
+        };
+        Ok(Self {
+            width_px: window.width() as u32,
+            height_px: window.height() as u32,
+            color: &self.color[first..],
+            depth: if P::HAS_DEPTH { &self.depth[first..] } else { &[] },
+            bounds: self.bounds.map(in_window),
+            ..self
+        })
+    }
+
     /// The same frame, restricted to the pixels in `bounds`: a renderer that knows where it drew
     /// saves the search for active pixels. Pixels outside are background, whatever the slices hold
     /// there.
@@ -122,24 +194,18 @@ impl<'a, P: PixelFormat> Frame<'a, P> {
 
     /// Number of pixels.
     pub fn len(&self) -> usize {
-        self.color.len()
+        self.width_px as usize * self.height_px as usize
     }
 
     /// Whether the image has no pixel at all.
     pub fn is_empty(&self) -> bool {
-        self.color.is_empty()
+        self.len() == 0
     }
 
     /// A composited image as a frame.
     pub(crate) fn of_image(image: &'a Image<P>) -> Self {
-        Self {
-            width_px: image.width_px,
-            height_px: image.height_px,
-            color: &image.colors,
-            depth: &image.depths,
-            bounds: None,
-            depth_range: None,
-        }
+        let row_px = image.width_px as usize;
+        Self::of_planes(image.width_px, image.height_px, row_px, &image.colors, &image.depths)
     }
 
     /// Whether the renderer has set bounds.
@@ -158,28 +224,22 @@ impl<'a, P: PixelFormat> Frame<'a, P> {
     /// # Panics
     /// If `index >= self.len()`, as slices do.
     pub fn pixel(&self, index: usize) -> P {
-        if let Some(bounds) = self.bounds {
-            let (x, y) = (index % self.width_px as usize, index / self.width_px as usize);
-            if x < bounds.x0 as usize
+        let (x, y) = (index % self.width_px as usize, index / self.width_px as usize);
+        if let Some(bounds) = self.bounds
+            && (x < bounds.x0 as usize
                 || x >= bounds.x1 as usize
                 || y < bounds.y0 as usize
-                || y >= bounds.y1 as usize
-            {
-                return P::EMPTY;
-            }
+                || y >= bounds.y1 as usize)
+        {
+            return P::EMPTY;
         }
-        P::from_parts(self.color[index], if P::HAS_DEPTH { self.depth[index] } else { 1.0 })
+        let at = y * self.row_px + x;
+        P::from_parts(self.color[at], if P::HAS_DEPTH { self.depth[at] } else { 1.0 })
     }
 
     /// Pixels of `bounds`, which must lie within the image.
     pub(crate) fn view(&self, bounds: Rect) -> View<'a, P> {
-        View {
-            bounds,
-            origin: (0, 0),
-            stride: self.width_px as usize,
-            colors: self.color,
-            depths: self.depth,
-        }
+        View { bounds, origin: (0, 0), stride: self.row_px, colors: self.color, depths: self.depth }
     }
 }
 
@@ -366,6 +426,55 @@ mod tests {
                 assert_eq!(frame.with_bounds(Rect::EMPTY).unwrap().drawn(kernels).0, Rect::EMPTY);
             }
         }
+    }
+
+    #[test]
+    fn windows_and_rows_with_padding_show_the_pixels_of_the_whole() {
+        let color: Vec<[u8; 4]> = (0..7 * 5).map(|k| [k, 0, 0, 1]).collect();
+        let depth: Vec<f32> = (0..7 * 5).map(|k| k as f32 / 64.0).collect();
+        let whole = Frame::with_depth(7, 5, &color, &depth).unwrap();
+        let bounded = whole.with_bounds(Rect { x0: 1, y0: 0, x1: 4, y1: 3 }).unwrap();
+        let window = Rect { x0: 2, y0: 1, x1: 6, y1: 5 };
+        for frame in [whole, bounded] {
+            let part = frame.window(window).unwrap();
+            assert_eq!((part.width_px(), part.height_px(), part.len()), (4, 4, 16));
+            for k in 0..16 {
+                assert_eq!(part.pixel(k), frame.pixel((k / 4 + 1) * 7 + k % 4 + 2), "pixel {k}");
+            }
+        }
+        // The last row ends with its last pixel.
+        let rows = Frame::<DepthPixel<[u8; 4]>>::with_rows(5, 5, 7, &color[2..], &depth[2..]);
+        let rows = rows.unwrap();
+        assert_eq!(rows.pixel(24), whole.pixel(34));
+        let whole_of_rows = whole.window(Rect { x0: 2, y0: 0, x1: 7, y1: 5 }).unwrap();
+        for kernels in [Kernels::new(None), Kernels(None)] {
+            assert_eq!(rows.drawn(kernels).0, whole_of_rows.drawn(kernels).0);
+        }
+        assert_eq!(whole.window(Rect::EMPTY).unwrap().len(), 0);
+    }
+
+    #[test]
+    fn rows_that_overlap_and_planes_that_end_early_are_refused() {
+        type Pixel = PremultipliedPixel<[u8; 4]>;
+        let color = [[1_u8; 4]; 12];
+        let text = |width, rows, row_px: usize| match Frame::<Pixel>::with_rows(
+            width,
+            rows,
+            row_px,
+            &color,
+            &[],
+        ) {
+            Ok(frame) => format!("{} pixels", frame.len()),
+            Err(error) => error.to_string(),
+        };
+        assert!(text(5, 2, 4).contains("at least their width"));
+        assert!(text(5, 3, 5).contains("the colour plane holds 12 values"));
+        assert!(text(5, 3, usize::MAX).contains("too few for 3 rows"));
+        assert_eq!(text(4, 3, 4), "12 pixels");
+        assert_eq!(text(2, 3, 5), "6 pixels");
+        assert_eq!(text(0, 3, usize::MAX), "0 pixels");
+        let window = Frame::<Pixel>::with_rows(4, 3, 4, &color, &[]).unwrap();
+        assert!(window.window(Rect { x0: 3, y0: 0, x1: 5, y1: 1 }).is_err());
     }
 
     #[test]

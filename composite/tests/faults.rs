@@ -1,9 +1,11 @@
 //! Every fault ends in a named error on every rank, with every strategy, and never in a hang.
-use composite::comm::{Arrival, Receive};
+mod meddling;
+
 use composite::{
     CommError, Communicator, CompositeError, Destination, Frame, MessageError, Options, Strategy,
     threads,
 };
+use meddling::{Meddling, Outgoing};
 use std::time::{Duration, Instant};
 
 const STRATEGIES: [Strategy; 4] =
@@ -22,73 +24,21 @@ enum Fault {
     Panic,
 }
 
-/// A communicator that damages the first message of [`CULPRIT`].
-struct Faulty {
-    inner: threads::ThreadComm,
-    fault: Fault,
-    sent: usize,
-}
-
-impl Communicator for Faulty {
-    fn rank(&self) -> usize {
-        self.inner.rank()
-    }
-
-    fn size(&self) -> usize {
-        self.inner.size()
-    }
-
-    fn send(
-        &mut self,
-        destination: usize,
-        tag: u32,
-        mut message: Vec<u8>,
-    ) -> Result<(), CommError> {
-        // Only messages with pixels; collective calls have other tags.
-        self.sent += usize::from(tag < composite::comm::FIRST_RESERVED_TAG);
-        if self.rank() == CULPRIT && tag < composite::comm::FIRST_RESERVED_TAG && self.sent == 1 {
-            match self.fault {
-                Fault::Truncated => message.truncate(message.len() - 3),
-                Fault::Longer => message.push(0),
-                Fault::Empty => message.clear(),
-                Fault::FlippedBit => {
-                    let last = message.len() - 1;
-                    message[last] ^= 16;
-                }
-                Fault::Swallowed => return Ok(()),
-                Fault::Panic => panic!("the culprit dies"),
+impl Fault {
+    /// What becomes of a message; false if it is not sent.
+    fn damage(self, message: &mut Vec<u8>) -> bool {
+        match self {
+            Fault::Truncated => message.truncate(message.len() - 3),
+            Fault::Longer => message.push(0),
+            Fault::Empty => message.clear(),
+            Fault::FlippedBit => {
+                let last = message.len() - 1;
+                message[last] ^= 16;
             }
+            Fault::Swallowed => return false,
+            Fault::Panic => panic!("the culprit dies"),
         }
-        self.inner.send(destination, tag, message)
-    }
-
-    fn now(&self) -> f64 {
-        self.inner.now()
-    }
-
-    fn post_recv(
-        &mut self,
-        source: usize,
-        tag: u32,
-        capacity: usize,
-    ) -> Result<Receive, CommError> {
-        self.inner.post_recv(source, tag, capacity)
-    }
-
-    fn wait_any(
-        &mut self,
-        posted: &mut Vec<Receive>,
-        timeout: Duration,
-    ) -> Result<Arrival, CommError> {
-        self.inner.wait_any(posted, timeout)
-    }
-
-    fn barrier(&mut self, timeout: Duration) -> Result<(), CommError> {
-        self.inner.barrier(timeout)
-    }
-
-    fn abort(&mut self, reason: &str) {
-        self.inner.abort(reason);
+        true
     }
 }
 
@@ -98,7 +48,11 @@ fn errors_of(fault: Fault, strategy: Strategy, timeout: Duration) -> Vec<Composi
     let depth = [0.5; 21];
     let begin = Instant::now();
     let results = threads::run(RANKS, |comm| {
-        let mut comm = Faulty { inner: comm, fault, sent: 0 };
+        // The first message with pixels.
+        let is_culprit = comm.rank() == CULPRIT;
+        let mut comm = Meddling::new(comm, |outgoing, message| {
+            !is_culprit || outgoing != Outgoing::Message(0) || fault.damage(message)
+        });
         let frame = Frame::with_depth(7, 3, &color, &depth).unwrap();
         let options = Options { strategy, timeout, verify: true, ..Options::default() };
         composite::composite(&mut comm, &frame, &options)

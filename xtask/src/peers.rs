@@ -27,6 +27,9 @@ const PACKAGES: &[(&str, &str)] = &[
     ("chromium", "the browser that schlieren's interactive page is tested in"),
     ("openmpi-bin", "Open MPI, one of the MPIs that composite runs over"),
     ("mpich", "MPICH, the other"),
+    ("libopenmpi-dev", "its compilers, for the programs in C and Fortran that use composite"),
+    ("libmpich-dev", "the same of MPICH"),
+    ("gfortran", "the compiler of Fortran behind both"),
     ("libsimgrid-dev", "SMPI, which runs 128 simulated ranks on one machine"),
     ("g++", "compiles vtk-bridge's C++ shim, as on the machines of users"),
     ("xvfb", "the X server of all programs below"),
@@ -65,6 +68,10 @@ const PROGRAMS: &[(&str, &str, &str)] = &[
     ("Open MPI", "RTSV_MPIRUN", "/usr/bin/mpirun.openmpi"),
     ("MPICH", "RTSV_MPIRUN_MPICH", "/usr/bin/mpirun.mpich"),
     ("SMPI", "RTSV_SMPIRUN", "/usr/bin/smpirun"),
+    ("Open MPI's C", "RTSV_MPICC", "/usr/bin/mpicc.openmpi"),
+    ("Open MPI's Fortran", "RTSV_MPIFORT", "/usr/bin/mpifort.openmpi"),
+    ("MPICH's C", "RTSV_MPICC_MPICH", "/usr/bin/mpicc.mpich"),
+    ("MPICH's Fortran", "RTSV_MPIFORT_MPICH", "/usr/bin/mpifort.mpich"),
     ("Xvfb", "RTSV_XVFB", "/usr/bin/Xvfb"),
     ("ParaView", "RTSV_PVBATCH", "/usr/bin/pvbatch"),
     ("Debian's Python", "RTSV_SYSTEM_PYTHON", "/usr/bin/python3"),
@@ -84,6 +91,7 @@ const WHEELS: &[(&str, &str, &str)] = &[
     ("vtk", "9.7.2", "reads what we write, writes what we read"),
     ("embreex", "4.4.0.post1", "brings Embree 4.4 as a shared library"),
     ("pynari", "1.2.6", "an ANARI program, and a device to compare with"),
+    ("mpi4py", "4.1.2", "MPI in Python, for programs that use composite; of either MPI"),
 ];
 
 /// Whether missing peers may be installed.

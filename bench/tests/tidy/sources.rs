@@ -22,6 +22,7 @@ pub(crate) const UNSAFE_MODULES: &[(&str, &str)] = &[
         "the function `main` of a shared library, which SimGrid's smpirun calls",
     ),
     ("composite/src/comm/mpi", "calls into an MPI library found at run time"),
+    ("composite/capi/src/capi", "the C ABI for programs with MPI"),
     (
         "composite/src/icet",
         "calls into IceT, found at run time; a comparison with IceT is a call into it",

@@ -51,7 +51,12 @@ pub(super) fn pack(
         let at = stage.join("usr/bin").join(link_of(program));
         link(&format!("../lib/rtsv/bin/{program}"), &at)?;
     }
-    link("../../rtsv/python/rtvtk", &stage.join("usr/lib/python3/dist-packages/rtvtk"))?;
+    let python = stage.join("usr/lib/python3/dist-packages");
+    for module in ["rtvtk", "rtsv_composite.py"] {
+        link(&format!("../../rtsv/python/{module}"), &python.join(module))?;
+    }
+    let pkg_config = stage.join("usr/lib/x86_64-linux-gnu/pkgconfig/rtsv-composite.pc");
+    write(&pkg_config, &super::pkg_config(&format!("/{HOME}"), version))?;
     shared(tree, &stage)?;
 
     let programs = PROGRAMS.iter().map(|p| tree.join("bin").join(p));

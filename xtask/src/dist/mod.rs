@@ -3,8 +3,10 @@
 //! ```text
 //! TREE/bin          the programs                          (deb: links in /usr/bin)
 //! TREE/lib          libgluray.so and libvtk_bridge.so     (the programs look in ../lib)
+//!                   librtsv_composite.so, with a file for pkg-config
 //! TREE/python       rtvtk, for the wheel of VTK           (deb: a link in Python's folder)
-//! TREE/include      rtv.h, the C interface of vtk-bridge
+//!                   rtsv_composite.py                     (deb: likewise)
+//! TREE/include      the C interfaces of vtk-bridge and of composite, the latter for Fortran too
 //! TREE/share        manual pages, completions, licences   (deb: in /usr/share)
 //! ```
 //!
@@ -27,12 +29,28 @@ use std::process::{Command, Stdio};
 /// The programs, and the member that builds each.
 const PROGRAMS: &[&str] = &["gluray", "schlieren", "composite", "vtk-bridge", "datasets", "bench"];
 
-/// The shared libraries, built by members `gluray-interposer` and `vtk-bridge`.
-const LIBRARIES: &[&str] = &["libgluray.so", "libvtk_bridge.so"];
+/// The shared libraries, built by members `gluray-interposer`, `vtk-bridge` and `composite-capi`.
+const LIBRARIES: &[&str] = &["libgluray.so", "libvtk_bridge.so", COMPOSITE];
+
+/// The C interface of composite. Programs are linked with this name, and ask for the one with the
+/// number of the interface when they run.
+const COMPOSITE: &str = "librtsv_composite.so";
 
 /// The members with something to ship.
-const MEMBERS: &[&str] =
-    &["gluray", "gluray-interposer", "schlieren", "composite", "vtk-bridge", "datasets", "bench"];
+const MEMBERS: &[&str] = &[
+    "gluray",
+    "gluray-interposer",
+    "schlieren",
+    "composite",
+    "composite-capi",
+    "vtk-bridge",
+    "datasets",
+    "bench",
+];
+
+/// Members that build a library alone.
+#[cfg(test)]
+const WITHOUT_PROGRAM: &[&str] = &["gluray-interposer", "composite-capi"];
 
 /// The shells with completions: name for the program's subcommand, folder below `share`, and what
 /// goes before and behind the program's name.
@@ -95,7 +113,7 @@ pub(crate) fn run(root: &Path, build: &Path, options: &DistOptions) -> Result<()
     if tree.exists() {
         fs::remove_dir_all(&tree).map_err(|e| format!("{}: {e}", tree.display()))?;
     }
-    fill(root, &built, &tree)?;
+    fill(root, &built, &tree, &version)?;
 
     let tarball = format!("{name}.tar.gz");
     let mut tar = vec!["--sort=name", "--owner=0", "--group=0", "--numeric-owner"];
@@ -110,7 +128,7 @@ pub(crate) fn run(root: &Path, build: &Path, options: &DistOptions) -> Result<()
 }
 
 /// Fills the tree from what was built.
-fn fill(root: &Path, built: &Path, tree: &Path) -> Result<(), String> {
+fn fill(root: &Path, built: &Path, tree: &Path, version: &str) -> Result<(), String> {
     let [bin, lib] = ["bin", "lib"].map(|d| tree.join(d));
     for program in PROGRAMS {
         copy(&built.join(program), &bin.join(program))?;
@@ -122,6 +140,7 @@ fn fill(root: &Path, built: &Path, tree: &Path) -> Result<(), String> {
         run_in(tree, "strip", &["--strip-unneeded", &format!("lib/{library}")])?;
     }
     copy(&root.join("vtk-bridge/include/rtv.h"), &tree.join("include/rtv.h"))?;
+    interface_of_composite(root, tree, version)?;
     let package = root.join("vtk-bridge/python/rtvtk");
     for file in files_with(&package, ".py")? {
         copy(&package.join(&file), &tree.join("python/rtvtk").join(&file))?;
@@ -144,6 +163,36 @@ fn fill(root: &Path, built: &Path, tree: &Path) -> Result<(), String> {
         copy(&root.join(file), &documents.join(file))?;
     }
     write(&documents.join("THIRD-PARTY.txt"), &notices::of(root, MEMBERS)?)
+}
+
+/// What programs need that use composite from C, Fortran or Python.
+fn interface_of_composite(root: &Path, tree: &Path, version: &str) -> Result<(), String> {
+    let member = root.join("composite/capi");
+    for file in ["rtsv_composite.h", "rtsv_composite.f90"] {
+        copy(&member.join("include").join(file), &tree.join("include").join(file))?;
+    }
+    let module = "python/rtsv_composite.py";
+    copy(&member.join(module), &tree.join(module))?;
+    let header = read(&tree.join("include/rtsv_composite.h"))?;
+    let abi = abi_of(&header).ok_or("rtsv_composite.h: there is no RTSV_COMPOSITE_ABI")?;
+    link(COMPOSITE, &tree.join("lib").join(format!("{COMPOSITE}.{abi}")))?;
+    write(&tree.join("lib/pkgconfig/rtsv-composite.pc"), &pkg_config("${pcfiledir}/../..", version))
+}
+
+/// The number of the interface in its header.
+fn abi_of(header: &str) -> Option<&str> {
+    let line = header.lines().find_map(|l| l.strip_prefix("#define RTSV_COMPOSITE_ABI "))?;
+    Some(line.trim_end_matches('u'))
+}
+
+/// The file for pkg-config. The library is in no folder of the system, so programs remember where.
+fn pkg_config(prefix: &str, version: &str) -> String {
+    format!(
+        "prefix={prefix}\nName: rtsv-composite\nDescription: sort-last compositing and rendering \
+         of scenes that no process has whole\nVersion: {version}\nCflags: \
+         -I${{prefix}}/include\nLibs: -L${{prefix}}/lib -Wl,-rpath,${{prefix}}/lib \
+         -lrtsv_composite\n"
+    )
 }
 
 /// The version in `[workspace.package]`.
@@ -247,6 +296,18 @@ mod tests {
     }
 
     #[test]
+    fn the_interface_of_composite_has_a_number_and_a_file_for_pkg_config() {
+        let header = crate::workspace_root().join("composite/capi/include/rtsv_composite.h");
+        let header = read(&header).expect("a header");
+        assert!(abi_of(&header).is_some_and(|abi| abi.parse::<u32>().is_ok()));
+        assert_eq!(abi_of("#define RTSV_COMPOSITE_ABI 3u\n"), Some("3"));
+        let file = pkg_config("/usr/x", "1.2.3");
+        let line = |l: &str| file.lines().any(|line| line == l);
+        assert!(line("prefix=/usr/x") && line("Version: 1.2.3"), "{file}");
+        assert!(line("Cflags: -I${prefix}/include"), "{file}");
+    }
+
+    #[test]
     fn the_version_is_that_of_the_workspace() {
         let manifest = read(&crate::workspace_root().join("Cargo.toml")).expect("a manifest");
         let version = version(&manifest).expect("a version");
@@ -265,7 +326,7 @@ mod tests {
 
     #[test]
     fn what_is_packed_is_what_members_build() {
-        for member in MEMBERS.iter().filter(|m| **m != "gluray-interposer") {
+        for member in MEMBERS.iter().filter(|m| !WITHOUT_PROGRAM.contains(m)) {
             assert!(PROGRAMS.contains(member), "{member} builds no program that is shipped");
             let folder = crate::workspace_root().join(member);
             assert!(folder.join("Cargo.toml").is_file(), "{member}");

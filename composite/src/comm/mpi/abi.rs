@@ -73,6 +73,14 @@ impl Abi {
         }
     }
 
+    /// Bytes of an `MPI_Comm`.
+    pub(super) fn handle_bytes(self) -> usize {
+        match self {
+            Self::OpenMpi | Self::Smpi => 8,
+            Self::Mpich => 4,
+        }
+    }
+
     pub(super) fn constants(self) -> Constants {
         match self {
             Self::OpenMpi => Constants {

@@ -68,6 +68,19 @@ pub enum MpiError {
         /// What it is.
         what: &'static str,
     },
+    /// The program was compiled with the headers of another MPI.
+    #[error(
+        "an MPI_Comm of this program has {bytes} bytes, but one of the MPI that runs ({library}) \
+         has {expected}: start the program with the launcher of the MPI that it was compiled with"
+    )]
+    OtherHeaders {
+        /// Size of the program's handles.
+        bytes: usize,
+        /// Size of the library's handles.
+        expected: usize,
+        /// The library.
+        library: String,
+    },
     /// A call failed while starting.
     #[error("{call} failed while starting MPI: {reason}")]
     Call {

@@ -5,7 +5,7 @@
 //! neither started nor ended.
 use super::library::Handle;
 use super::{Abi, CHUNK_BYTES, DRAIN_TIMEOUT, Mpi, MpiComm, MpiError};
-use std::ffi::c_int;
+use std::ffi::{c_int, c_void};
 use std::rc::Rc;
 use std::time::{Duration, Instant};
 
@@ -31,10 +31,66 @@ impl MpiComm {
     /// [`MpiError::NotRunning`], [`MpiError::OtherThread`], [`MpiError::UnusableCommunicator`], and
     /// those of finding the library.
     pub unsafe fn from_handle(comm: usize) -> Result<Self, MpiError> {
-        let mut mpi = Mpi::load_started()?;
-        mpi.started();
-        check_running(&mpi)?;
-        check_thread(&mpi)?;
+        // SAFETY: the caller's promise.
+        unsafe { Self::over(running()?, comm) }
+    }
+
+    /// As [`from_handle`](Self::from_handle), for a handle in memory, as C has it:
+    /// `from_object(&comm, sizeof comm)` for an `MPI_Comm comm`. The size tells whether the program
+    /// was compiled with the headers of the MPI that runs.
+    ///
+    /// # Safety
+    /// As [`from_handle`](Self::from_handle); `comm` is null or points to `bytes` readable bytes.
+    ///
+    /// # Errors
+    /// As [`from_handle`](Self::from_handle), and [`MpiError::OtherHeaders`].
+    pub unsafe fn from_object(comm: *const c_void, bytes: usize) -> Result<Self, MpiError> {
+        let mpi = running()?;
+        let expected = mpi.abi.handle_bytes();
+        if comm.is_null() {
+            return Err(MpiError::UnusableCommunicator { what: "a null pointer" });
+        }
+        if bytes != expected {
+            let library = mpi.version.lines().next().unwrap_or_default().to_owned();
+            return Err(MpiError::OtherHeaders { bytes, expected, library });
+        }
+        let mut handle = [0_u8; size_of::<Handle>()];
+        // SAFETY: the caller's promise, and a handle has at most the size of `handle`.
+        unsafe { std::ptr::copy_nonoverlapping(comm.cast(), handle.as_mut_ptr(), bytes) };
+        // SAFETY: the caller's promise. All ABIs here are little-endian.
+        unsafe { Self::over(mpi, Handle::from_le_bytes(handle)) }
+    }
+
+    /// As [`from_handle`](Self::from_handle), for a handle of Fortran: the integer that a
+    /// communicator is in the modules `mpi` and `mpif.h`, or `comm%MPI_VAL` in `mpi_f08`.
+    ///
+    /// # Safety
+    /// As [`from_handle`](Self::from_handle).
+    ///
+    /// # Errors
+    /// As [`from_handle`](Self::from_handle), and [`MpiError::MissingSymbol`] for a library without
+    /// `MPI_Comm_f2c`.
+    pub unsafe fn from_fortran(comm: i32) -> Result<Self, MpiError> {
+        let mpi = running()?;
+        let handle = match (mpi.abi, mpi.comm_from_fortran) {
+            // The handles of C and Fortran are the same integers.
+            (Abi::Mpich, _) => comm as u32 as Handle,
+            // SAFETY: the function returns null or the null communicator for unknown integers.
+            (_, Some(from_fortran)) => unsafe { from_fortran(comm) },
+            (_, None) => {
+                return Err(MpiError::MissingSymbol {
+                    library: mpi.version.lines().next().unwrap_or_default().to_owned(),
+                    symbol: "MPI_Comm_f2c".to_owned(),
+                });
+            }
+        };
+        // SAFETY: the caller's promise.
+        unsafe { Self::over(mpi, handle) }
+    }
+
+    /// # Safety
+    /// `comm` is a communicator of `mpi`, and all its ranks make this call.
+    unsafe fn over(mpi: Mpi, comm: Handle) -> Result<Self, MpiError> {
         if comm == mpi.comm_null || comm == 0 {
             return Err(MpiError::UnusableCommunicator { what: "MPI_COMM_NULL" });
         }
@@ -98,6 +154,15 @@ impl MpiComm {
     pub(super) fn is_mpi_over(&self) -> bool {
         is_finalized(&self.mpi)
     }
+}
+
+/// The MPI of the surrounding program, if this thread may call it.
+fn running() -> Result<Mpi, MpiError> {
+    let mut mpi = Mpi::load_started()?;
+    mpi.started();
+    check_running(&mpi)?;
+    check_thread(&mpi)?;
+    Ok(mpi)
 }
 
 fn is_finalized(mpi: &Mpi) -> bool {

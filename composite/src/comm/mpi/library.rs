@@ -85,6 +85,8 @@ pub(super) type Split = unsafe extern "C" fn(Handle, c_int, c_int, *mut Handle) 
 pub(super) type Query = unsafe extern "C" fn(*mut c_int) -> c_int;
 /// `MPI_Comm_test_inter`.
 pub(super) type TestInter = unsafe extern "C" fn(Handle, *mut c_int) -> c_int;
+/// `MPI_Comm_f2c`; the integers of Fortran have 32 bits in all three ABIs.
+pub(super) type FromFortran = unsafe extern "C" fn(c_int) -> Handle;
 /// `MPI_Comm_free`.
 pub(super) type CommFree = unsafe extern "C" fn(*mut Handle) -> c_int;
 
@@ -113,6 +115,7 @@ pub(crate) struct Mpi {
     pub(super) is_thread_main: Option<Query>,
     pub(super) finalized: Option<Query>,
     pub(super) test_inter: Option<TestInter>,
+    pub(super) comm_from_fortran: Option<FromFortran>,
     // Last, so that nothing outlives it; never unloaded in practice, because MPI libraries leave
     // threads behind.
     _library: std::mem::ManuallyDrop<Library>,
@@ -181,12 +184,13 @@ impl Mpi {
         let constants = abi.constants();
         // SAFETY: the MPI standard fixes these functions' arguments, with handles as in
         // `Functions`.
-        let (split_type, comm_free, split, test_inter) = unsafe {
+        let (split_type, comm_free, split, test_inter, comm_from_fortran) = unsafe {
             (
                 library.get::<SplitType>(b"MPI_Comm_split_type").ok().map(|symbol| *symbol),
                 library.get::<CommFree>(b"MPI_Comm_free").ok().map(|symbol| *symbol),
                 library.get::<Split>(b"MPI_Comm_split").ok().map(|symbol| *symbol),
                 library.get::<TestInter>(b"MPI_Comm_test_inter").ok().map(|symbol| *symbol),
+                library.get::<FromFortran>(b"MPI_Comm_f2c").ok().map(|symbol| *symbol),
             )
         };
         let query = |name: &[u8]| {
@@ -219,6 +223,7 @@ impl Mpi {
             is_thread_main,
             finalized,
             test_inter,
+            comm_from_fortran,
             _library: library,
         })
     }

@@ -273,19 +273,35 @@ impl Transfers {
         if code == 0 { Ok(()) } else { Err(failed(mpi, self.rank, "MPI_Irecv", code)) }
     }
 
-    /// The first of `wanted` that is complete, and its message. Checks complete ones only: with a
-    /// hundred receives posted, a scan of all of them after each message takes longer than the
-    /// messages.
+    /// The first of `wanted` that is complete, and its message. Those of one source and tag come in
+    /// the order in which they were posted: MPI matches them so, but it may complete a short
+    /// message before a long one that was sent earlier. Checks complete ones only: with a hundred
+    /// receives posted, a scan of all of them after each message takes longer than the messages.
     pub(super) fn take(
         &mut self,
         wanted: impl Fn(u64) -> Option<usize>,
     ) -> Option<(usize, Vec<u8>)> {
-        let found =
-            self.finished.iter().enumerate().find_map(|(at, &id)| Some((at, id, wanted(id)?)));
-        let (at, id, position) = found?;
-        self.finished.remove(at);
-        let index = self.incoming.iter().position(|other| other.id == id)?;
-        Some((position, self.incoming.remove(index).buffer))
+        let next = |&id: &u64| {
+            wanted(id)?;
+            let last = self.incoming.iter().position(|other| other.id == id)?;
+            let key = |of: &Incoming| (of.source, of.tag);
+            for (index, ahead) in self.incoming[..=last].iter().enumerate() {
+                if key(ahead) != key(&self.incoming[last]) {
+                    continue;
+                }
+                match (ahead.done, wanted(ahead.id)) {
+                    (false, _) => return None,
+                    (true, Some(position)) => return Some((index, position)),
+                    // Nobody waits for it any more.
+                    (true, None) => {}
+                }
+            }
+            None
+        };
+        let (index, position) = self.finished.iter().find_map(next)?;
+        let taken = self.incoming.remove(index);
+        self.finished.retain(|&id| id != taken.id);
+        Some((position, taken.buffer))
     }
 
     /// Lets MPI work and receives at most one chunk; with `wait` it blocks until one has arrived,

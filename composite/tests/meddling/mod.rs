@@ -1,0 +1,84 @@
+//! A rank among threads whose messages are changed on their way: what tests of faults share.
+use composite::comm::{Arrival, Receive};
+use composite::{CommError, Communicator, threads};
+use std::time::Duration;
+
+/// What is about to be sent, with its number among those of its kind, from 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Outgoing {
+    /// A message to one rank.
+    Message(usize),
+    /// A contribution to an all-gather.
+    Gathered(usize),
+}
+
+/// Calls `meddle` with all that this rank sends, but for collective calls of the transport itself.
+/// What it returns false for is not sent.
+pub(crate) struct Meddling<F> {
+    inner: threads::ThreadComm,
+    meddle: F,
+    messages: usize,
+    gathered: usize,
+}
+
+impl<F: FnMut(Outgoing, &mut Vec<u8>) -> bool> Meddling<F> {
+    pub(crate) fn new(inner: threads::ThreadComm, meddle: F) -> Self {
+        Self { inner, meddle, messages: 0, gathered: 0 }
+    }
+}
+
+impl<F: FnMut(Outgoing, &mut Vec<u8>) -> bool> Communicator for Meddling<F> {
+    fn rank(&self) -> usize {
+        self.inner.rank()
+    }
+
+    fn size(&self) -> usize {
+        self.inner.size()
+    }
+
+    fn now(&self) -> f64 {
+        self.inner.now()
+    }
+
+    fn send(&mut self, to: usize, tag: u32, mut message: Vec<u8>) -> Result<(), CommError> {
+        if tag < composite::comm::FIRST_RESERVED_TAG {
+            self.messages += 1;
+            if !(self.meddle)(Outgoing::Message(self.messages - 1), &mut message) {
+                return Ok(());
+            }
+        }
+        self.inner.send(to, tag, message)
+    }
+
+    fn post_recv(&mut self, from: usize, tag: u32, capacity: usize) -> Result<Receive, CommError> {
+        self.inner.post_recv(from, tag, capacity)
+    }
+
+    fn wait_any(
+        &mut self,
+        posted: &mut Vec<Receive>,
+        timeout: Duration,
+    ) -> Result<Arrival, CommError> {
+        self.inner.wait_any(posted, timeout)
+    }
+
+    fn barrier(&mut self, timeout: Duration) -> Result<(), CommError> {
+        self.inner.barrier(timeout)
+    }
+
+    fn all_gather(
+        &mut self,
+        mine: &[u8],
+        longest: usize,
+        timeout: Duration,
+    ) -> Result<Vec<Vec<u8>>, CommError> {
+        let mut message = mine.to_vec();
+        self.gathered += 1;
+        (self.meddle)(Outgoing::Gathered(self.gathered - 1), &mut message);
+        self.inner.all_gather(&message, longest, timeout)
+    }
+
+    fn abort(&mut self, reason: &str) {
+        self.inner.abort(reason);
+    }
+}
