@@ -193,8 +193,19 @@ def _functions(library, path):
     )
 
 
+def check_vtk(version):
+    """Raises `RtvError` for a VTK whose classes cannot be replaced from Python."""
+    if tuple(version[:2]) < (9, 3):
+        named = ".".join(map(str, version))
+        raise RtvError(f"VTK {named} is older than 9.3, which rtvtk needs; pip install --upgrade vtk")
+
+
 def set_host(major, minor, build):
-    """Loads the library and tells it the VTK version. Raises `RtvError` if it cannot be loaded."""
+    """Loads the library and tells it the VTK version.
+
+    Raises `RtvError` if it cannot be loaded, or VTK is too old.
+    """
+    check_vtk((major, minor, build))
     Bridge.calls()["host"](major, minor, build)
 
 
