@@ -23,7 +23,7 @@ def velocity(at):
 
 
 # Lines begin on four rings upstream; Runge and Kutta's steps of fourth order.
-rings, around, steps, step_s = (0.06, 0.25, 0.45, 0.7), 24, 260, 0.0012
+rings, around, steps, step_s = (0.04, 0.2, 0.4, 0.6, 0.8), 10, 270, 0.0012
 angles = np.linspace(0, 2 * np.pi, around, endpoint=False)
 ring, angle = np.meshgrid(rings, angles, indexing="ij")
 at = np.stack([np.full(ring.shape, -1.5), ring * np.cos(angle), ring * np.sin(angle)], axis=-1)
@@ -55,14 +55,14 @@ span = (0, 1.5 * WIND_M_S)
 picture = rt_core.render(
     rt_core.Tubes(
         lines.reshape(-1, 3),
-        0.012,
+        0.014,
         offsets=np.arange(len(lines) + 1) * lines.shape[1],
         scalars=speed.reshape(-1),
         range=span,
     ),
     rt_core.Spheres([[0, 0, 0]], RADIUS_M, color=(0.75, 0.75, 0.78)),
-    camera=rt_core.Camera((-2.2, -3.6, 1.7), (0.05, 0, -0.04), fov=31),
-    size=(900, 560),
+    camera=rt_core.Camera((-1.2, -4.4, 1.5), (0.1, 0, 0), fov=29),
+    size=(900, 520),
     samples=9,
     lights=[(-0.5, -1, 1.4)],
     ambient=0.5,

@@ -102,7 +102,7 @@ plate = rt_core.Mesh(
 picture = rt_core.render(
     rt_core.Mesh(*boxes(), color=(0.7, 0.66, 0.6)),
     plate,
-    camera=rt_core.Camera((40, -115, 80), (0, -4, 0), fov=37),
+    camera=rt_core.Camera((32, -120, 95), (-2, -4, 0), fov=41),
     size=(720, 540),
     samples=8,
     lights=[(-0.3, -0.6, 0.8)],

@@ -47,10 +47,10 @@ cloud = rt_core.Volume(
 )
 camera = rt_core.Camera((0, -100, 0), (0, 0, 0), height=2 * reach)
 picture = rt_core.render(cloud, camera=camera, size=(640, 640), samples=4, ambient=1.0)
-# Along z there is light above and below, and none on the plane between the lobes.
+# Along z there are lobes above and below, and the plane between them is empty.
 cover = picture.color[..., 3]
-assert cover[100:300, 320].max() > 0.5 and cover[320, 320] < 0.05
-np.testing.assert_allclose(cover, cover[::-1], atol=0.02)
+assert cover[100:300, 320].max() > 0.5 and cover[318:322].max() < 0.1
+np.testing.assert_allclose(cover, cover[::-1], atol=0.1)
 
 figure, ax = pyplot.subplots(figsize=(6.6, 5.6), layout="constrained")
 ax.set_facecolor("black")

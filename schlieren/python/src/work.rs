@@ -23,5 +23,15 @@ pub(crate) fn run<R: Send>(
     threads: usize,
     work: impl FnOnce(&Stop) -> R + Send,
 ) -> PyResult<R> {
-    WORKERS.run(py, threads, Length::Long, work)
+    run_for(py, Length::Long, threads, work)
+}
+
+/// The same for work that may be short ([`Workers::run`]).
+pub(crate) fn run_for<R: Send>(
+    py: Python<'_>,
+    length: Length,
+    threads: usize,
+    work: impl FnOnce(&Stop) -> R + Send,
+) -> PyResult<R> {
+    WORKERS.run(py, threads, length, work)
 }
