@@ -24,16 +24,26 @@ width = 2.2 + 0.05 * (y + 20)
 lean = 0.1 * (y + 20)
 strong = np.exp(-(((x - 6 - lean) / width) ** 2) - (z / width) ** 2)
 weak = np.exp(-(((x + 6) / width) ** 2) - ((z - 5) / width) ** 2)
-mass = np.clip(0.06 * strong + 0.03 * weak, 0, 1)
+mass = 0.03 * strong + 0.015 * weak
 air, helium = 1.204, 0.166
 density = 1 / (mass / helium + (1 - mass) / air)
 field = schlieren.Field(
-    density=density, species={"He": mass}, spacing=s[1] - s[0], length_unit="mm", origin=(-20,) * 3
+    density=density,
+    species={"He": mass, "air": 1 - mass},
+    spacing=s[1] - s[0],
+    length_unit="mm",
+    origin=(-20,) * 3,
 )
 
 angles_deg = np.arange(0, 180, 7.5)
 mine = range(comm.rank, len(angles_deg), comm.size)
-view = {"technique": "interferogram", "size": (120, 90), "layers": "phase", "tolerance_rad": 1e-4}
+view = {
+    "technique": "interferogram",
+    "size": (160, 120),
+    "field_of_view_m": 0.05,
+    "layers": "phase",
+    "tolerance_rad": 1e-4,
+}
 
 
 def rendered(number, **options):
@@ -42,14 +52,14 @@ def rendered(number, **options):
 
 
 threads = max(1, schlieren.count_threads() // comm.size)
-rows = {number: rendered(number, threads=threads).phase_waves[45] for number in mine}
+rows = {number: rendered(number, threads=threads).phase_waves[60] for number in mine}
 gathered = comm.gather(rows, root=0)
 if comm.rank == 0:
     found = {number: row for part in gathered for number, row in part.items()}
     sinogram = np.stack([found[number] for number in range(len(angles_deg))])
     # Which rank rendered a view makes no difference.
     first = rendered(0)
-    last = rendered(len(angles_deg) - 1).phase_waves[45]
+    last = rendered(len(angles_deg) - 1).phase_waves[60]
     np.testing.assert_array_equal(last, sinogram[-1])
     # From every side the same gas is looked through: the sum of a row changes little.
     sums = sinogram.sum(axis=1)
