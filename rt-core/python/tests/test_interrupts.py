@@ -37,7 +37,7 @@ AFTER = "assert rt_core.Scene(*sphere(8)).occluded([[0, 0, 5]], [[0, 0, -1]])[0]
         ("rt_core.Scene(*large)", ""),
         ("rt_core.render(rt_core.Mesh(*sphere(8)), samples=10**6)", ""),
     ],
-    ids=["cast", "occluded", "count", "all_hits", "contains", "closest", "signed", "build", "render"],
+    ids="cast occluded count all_hits contains closest signed build render".split(),
 )
 def test_ctrl_c_stops_long_calls(call, after):
     interrupts.check([os.path.dirname(__file__)], PREPARE, call, AFTER + after)

@@ -94,7 +94,8 @@ for name, values, dimensions in (
 ):
     numbers = listed([f"{v:.8g}" for v in values])
     text = f"dimensions {dimensions};\ninternalField nonuniform List<scalar> {numbers};\n"
-    write(case / "2" / name, "volScalarField", text + "boundaryField { walls { type zeroGradient; } }\n")
+    text += "boundaryField { walls { type zeroGradient; } }\n"
+    write(case / "2" / name, "volScalarField", text)
 
 # -- From here on a case of yours would do. --------------------------------------------------------
 field = schlieren.Field.open(

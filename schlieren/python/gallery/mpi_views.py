@@ -19,11 +19,11 @@ comm = MPI.COMM_WORLD
 # Every rank makes the same field; a file would be read by each, or broadcast.
 s = np.linspace(-20, 20, 65)
 x, y, z = np.meshgrid(s, s, s, indexing="ij")
-# The jet rises along y, leans and widens, and is not round: two streams of unequal strength.
-width = 2.2 + 0.05 * (y + 20)
-lean = 0.1 * (y + 20)
-strong = np.exp(-(((x - 6 - lean) / width) ** 2) - (z / width) ** 2)
-weak = np.exp(-(((x + 6) / width) ** 2) - ((z - 5) / width) ** 2)
+# The jet rises along z, leans and widens, and is not round: two streams of unequal strength.
+width = 2.2 + 0.05 * (z + 20)
+lean = 0.1 * (z + 20)
+strong = np.exp(-(((x - 6 - lean) / width) ** 2) - (y / width) ** 2)
+weak = np.exp(-(((x + 6) / width) ** 2) - ((y - 5) / width) ** 2)
 mass = 0.03 * strong + 0.015 * weak
 air, helium = 1.204, 0.166
 density = 1 / (mass / helium + (1 - mass) / air)

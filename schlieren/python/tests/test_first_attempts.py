@@ -43,8 +43,8 @@ def test_what_does_not_work_is_said(call, error, parts):
     [
         (
             "density",
-            "kg/m3 kg/m^3 kg/m**3 kg.m-3 kg·m⁻³ kg/m³ kilogram/meter**3 kg*m^-3 kg/(m^3) g/L".split()
-            + ["kg m-3", "kg m^-3", "kg m**-3", "kilogram / meter ** 3", " kg / m^3 "],
+            "kg/m3 kg/m^3 kg/m**3 kg.m-3 kg·m⁻³ kg/m³ kg*m^-3 kg/(m^3) g/L".split()
+            + ["kilogram/meter**3", "kg m-3", "kg m^-3", "kg m**-3", "kilogram / meter ** 3", " kg / m^3 "],
         ),
         ("temperature", "K kelvin Kelvin".split()),
         ("pressure", "Pa pascal Pascals N/m2".split() + ["N m-2"]),

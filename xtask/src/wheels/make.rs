@@ -49,7 +49,8 @@ pub(super) fn make(
 
 /// A build without what only debuggers read, which would be most of the wheel.
 fn without_debug_info(command: &mut Command) -> &mut Command {
-    let plain = [("CARGO_PROFILE_RELEASE_DEBUG", "none"), ("CARGO_PROFILE_RELEASE_STRIP", "symbols")];
+    let plain =
+        [("CARGO_PROFILE_RELEASE_DEBUG", "none"), ("CARGO_PROFILE_RELEASE_STRIP", "symbols")];
     command.envs(plain)
 }
 

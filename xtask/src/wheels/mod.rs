@@ -3,8 +3,8 @@
 //!
 //! maturin makes rt_core and schlieren, and rtvtk's own backend rtvtk. auditwheel checks that each
 //! keeps to the policy in its name: `manylinux_2_34`, which is glibc 2.34 or later (Debian 12,
-//! Ubuntu 22.04, RHEL 9), and `manylinux_2_35` for schlieren, whose `hypot` has a new version there.
-//! An older one needs a build on an older system.
+//! Ubuntu 22.04, RHEL 9), and `manylinux_2_35` for schlieren, whose `hypot` has a new version
+//! there. An older one needs a build on an older system.
 
 use std::fs;
 use std::path::{Path, PathBuf};

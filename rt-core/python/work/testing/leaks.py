@@ -58,5 +58,7 @@ def check(call, count):
     finally:
         tracemalloc.stop()
     python, native, pages = (b - a for a, b in zip(before, after))
-    told = f"{count} calls leave {python} bytes of Python, {native} of the C library, {pages} resident"
+    told = (
+        f"{count} calls leave {python} bytes of Python, {native} of the C library, {pages} resident"
+    )
     assert python < KEPT_BYTES and native < KEPT_BYTES and pages < RESIDENT_BYTES, told
