@@ -25,7 +25,7 @@ Name: {NAME}
 Version: {VERSION}
 Summary: Ray tracing inside unmodified VTK scripts, for the stock vtk wheel
 Requires-Python: >=3.9
-Requires-Dist: vtk>=9.3
+Requires-Dist: vtk>=9.4
 Requires-Dist: numpy
 License-Expression: MIT OR Apache-2.0
 {"".join(f"License-File: {name}{chr(10)}" for name in LICENSES)}"""
@@ -140,7 +140,7 @@ def rust_sources():
     for name, folder in sorted(members(found).items()):
         inside = folder.relative_to(root).as_posix()
         folders.append(inside)
-        listed = cargo("package", "--list", "--allow-dirty", "-p", name, text=True)
+        listed = cargo("package", "-q", "--list", "--allow-dirty", "-p", name, text=True)
         for path in listed.split("\n"):
             file = folder / path
             # Cargo names files too that it would only make.

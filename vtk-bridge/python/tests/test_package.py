@@ -85,7 +85,7 @@ def test_scripts_look_the_same(name, tmp_path):
 def test_a_vtk_that_is_too_old_is_refused_by_name():
     from rtvtk import library
 
-    with pytest.raises(rtvtk.RtvError, match=r"VTK 9\.2\.6 is older than 9\.3.*--upgrade vtk"):
-        library.check_vtk((9, 2, 6))
-    library.check_vtk((9, 3, 0))
+    with pytest.raises(rtvtk.RtvError, match=r"VTK 9\.3\.1 is older than 9\.4.*--upgrade vtk"):
+        library.check_vtk((9, 3, 1))
+    library.check_vtk((9, 4, 0))
     library.check_vtk((10, 0, 0))

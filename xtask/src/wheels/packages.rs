@@ -77,7 +77,7 @@ pub(super) const PACKAGES: &[Package] = &[
         alone_with: &[],
         adapted: &["vtk==9.7.2", "pyvista[jupyter]", "nbclient", "ipykernel"],
         // Each with one of VTK's versions that the package is for.
-        others: &[&["vtk==9.3.1"], &["vtk==9.4.2"], &["vtk==9.5.2"], &["vtk==9.6.2"]],
+        others: &[&["vtk==9.4.2"], &["vtk==9.5.2"], &["vtk==9.6.2"]],
         reference: None,
     },
 ];
