@@ -21,16 +21,16 @@ def refused(call, *args, **options):
 
 
 CALLS = {
-    "index": (50_000, lambda: schlieren.index()),
+    "index": (11_000, lambda: schlieren.index()),
     "render": (300, lambda: schlieren.render(OF, **FEW)),
     "render_all": (200, lambda: schlieren.render(OF, "bos", layers="all", **FEW)),
     "probe": (500, lambda: schlieren.probe(OF, (1, 1), tolerance_rad=1e-3, threads=1)),
     "fields": (1000, lambda: schlieren.Field(**FIELD)),
     "fields_and_render": (100, lambda: schlieren.render(schlieren.Field(**FIELD), **FEW)),
     # By a check of Python's files, by the native module, by the library.
-    "refused_sizes": (20_000, lambda: refused(schlieren.render, OF, size=(0, 2))),
+    "refused_sizes": (70_000, lambda: refused(schlieren.render, OF, size=(0, 2))),
     "refused_names": (1000, lambda: refused(schlieren.render, OF, "schliern")),
-    "refused_index": (25_000, lambda: refused(schlieren.index, species={"?": 1.0})),
+    "refused_index": (10_000, lambda: refused(schlieren.index, species={"?": 1.0})),
     "refused_fields": (5000, lambda: refused(schlieren.Field, density=DENSITY, spacing=-1)),
     "refused_march": (500, lambda: refused(schlieren.render, OF, march="?", **FEW)),
     "refused_files": (400, lambda: refused(schlieren.Field.open, "?.vti", density="rho")),
