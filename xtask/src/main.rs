@@ -53,10 +53,10 @@ cargo xtask dist [--profile NAME] [--out FOLDER]
       --out FOLDER      put them there instead of into target/dist
 
 cargo xtask wheels [--package NAME] [--profile NAME] [--out FOLDER]
-    Makes the wheels and the source archives of the Python packages rt_core and schlieren, installs \
-    the wheels in fresh environments of every Python of 3.10 or later here, and runs their tests \
-    there.
-      --package NAME    only rt_core, or only schlieren
+    Makes the wheels and the source archives of the Python packages rt_core, schlieren and rtvtk, \
+    installs the wheels in fresh environments of every Python of 3.10 or later here, and runs \
+    their tests there.
+      --package NAME    only rt_core, schlieren or rtvtk
       --profile NAME    build with this profile of cargo's instead of `release`
       --out FOLDER      put them there instead of into target/wheels/dist
 

@@ -37,7 +37,12 @@ struct Measured {
 }
 
 pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
-    record.column("kind", "", "building; the first hit of each ray; all hits of each ray");
+    record.column(
+        "kind",
+        "",
+        "importing beyond numpy; from Ctrl-C to the end of a call; building; the first hit of each \
+         ray; all hits of each ray",
+    );
     record.column("triangles", "", "triangles of the mesh");
     record.column("rays", "", "rays of one call");
     record.column("tracer", "", "package");
@@ -89,7 +94,11 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
 
 fn row(m: &Measured) -> Option<Row> {
     let time = Summary::of(&m.seconds)?;
-    let count = if m.kind == "build" { m.triangles } else { m.rays };
+    let count = match m.kind.as_str() {
+        "build" => m.triangles,
+        "first" | "all" => m.rays,
+        _ => 0,
+    };
     Some(
         Row::new()
             .with("kind", m.kind.as_str())
@@ -116,6 +125,7 @@ fn ratios(rows: &[Measured]) -> Vec<Ratio> {
                 other.seconds.iter().zip(&ours.seconds).map(|(o, s)| o / s).collect();
             let name = match ours.kind.as_str() {
                 "build" => format!("{OURS}: build of {} triangles", ours.triangles),
+                "import" => format!("{OURS}: import"),
                 kind => format!(
                     "{OURS}: {kind} hits of {} rays, {} triangles",
                     ours.rays, ours.triangles

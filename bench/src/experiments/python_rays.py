@@ -6,7 +6,11 @@ kind and number of rays the seconds of each package in each round.
 
 import importlib
 import json
+import os
+import signal
+import subprocess
 import sys
+import threading
 import time
 
 import numpy as np
@@ -128,7 +132,35 @@ class PyVista:
         return sum(len(self.mesh.ray_trace(o, e)[1]) for o, e in zip(origins, ends))
 
 
+IMPORT = "import time, numpy; t = time.perf_counter(); import {}; print(time.perf_counter() - t)"
+
+
+def import_seconds(module):
+    """Seconds that an import takes beyond numpy's, in a process of its own."""
+    return float(subprocess.check_output([sys.executable, "-c", IMPORT.format(module)]))
+
+
+def stop_seconds(call):
+    """Seconds from Ctrl-C to the end of a long call."""
+    pressed = []
+
+    def press():
+        pressed.append(time.perf_counter())
+        os.kill(os.getpid(), signal.SIGINT)
+
+    timer = threading.Timer(0.2, press)
+    try:
+        timer.start()
+        while True:
+            call()
+    except KeyboardInterrupt:
+        seconds = time.perf_counter() - pressed[0]
+    timer.join()
+    return seconds
+
+
 def main():
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     order = json.load(sys.stdin)
     versions, missing, tracers = {}, [], []
     for tracer in (RtCore, TrimeshRtCore, TrimeshEmbree, Open3D, PyVista):
@@ -163,6 +195,21 @@ def main():
                     "found": found[name],
                 }
             )
+
+    def alone(kind, name, triangles, count, seconds):
+        """A measurement without found hits."""
+        row = {"kind": kind, "tracer": name, "triangles": triangles, "rays": count, "found": 0}
+        rows.append(row | {"seconds": seconds})
+
+    for turn in {t.module: t for t in tracers}.values():
+        seconds = [import_seconds(turn.module) for _ in range(order["rounds"])]
+        alone("import", turn.module, 0, 0, seconds)
+    if RtCore in tracers:
+        vertices, triangles = mesh(max(order["rings"]))
+        scene, (origins, directions) = RtCore(vertices, triangles).scene, rays(4_000_000)
+        calls = [lambda: scene.cast(origins, directions), lambda: scene.count(origins, directions)]
+        seconds = [stop_seconds(call) for call in calls for _ in range(order["rounds"])]
+        alone("stop", RtCore.name, len(triangles), len(origins), seconds)
 
     for rings in order["rings"]:
         vertices, triangles = mesh(rings)

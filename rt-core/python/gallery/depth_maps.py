@@ -7,6 +7,9 @@ import sys
 
 import numpy as np
 import rt_core
+from matplotlib import pyplot
+
+pyplot.switch_backend("Agg")
 
 # The object: a knotted tube of triangles.
 turns, around = 400, 24
@@ -49,12 +52,23 @@ error = scene.closest_point(points).distance.max()
 print(f"{len(points)} points of 6 views; farthest from the surface {error:.1e}")
 assert len(points) > 30_000 and error < 1e-5
 
-size = 0.02
-picture = rt_core.render(
-    rt_core.Spheres(points[::4], size, scalars=points[::4, 2]),
-    size=(480, 360),
-    samples=4,
-    ambient=0.3,
-    lights=[(1, -1, 2)],
+figure, (one, cloud) = pyplot.subplots(
+    1, 2, figsize=(10.5, 4.4), layout="constrained", width_ratios=(1, 1.2)
 )
-picture.save(sys.argv[1] if len(sys.argv) > 1 else "depth_maps.png")
+depth = np.where(np.isfinite(maps[1]), maps[1], np.nan)
+shown = one.imshow(depth, extent=(-4, 4, -4, 4), cmap="viridis_r")
+one.set(title="one of six depth maps", xlabel="m", ylabel="m", facecolor="0.9")
+figure.colorbar(shown, ax=one, label="depth in m", shrink=0.85)
+picture = rt_core.render(
+    rt_core.Spheres(points[::2], 0.035, scalars=points[::2, 2]),
+    camera=rt_core.Camera((4.2, -9.5, 7), (0, 0, 0), fov=36),
+    size=(640, 480),
+    samples=8,
+    ambient=0.5,
+    lights=[(1, -1, 2)],
+    ambient_occlusion=(2.0, 4),
+)
+cloud.imshow(picture.rgba8)
+cloud.set_axis_off()
+cloud.set_title(f"{len(points)} points of all six")
+figure.savefig(sys.argv[1] if len(sys.argv) > 1 else "depth_maps.png", dpi=80)

@@ -19,8 +19,8 @@ array([[0., 0., 1.]], dtype=float32)
 """
 
 from rt_core._rt_core import NO_HIT, count_threads
+from rt_core._camera import Camera
 from rt_core._pictures import (
-    Camera,
     Isosurface,
     Mesh,
     Picture,

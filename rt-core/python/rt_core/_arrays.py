@@ -5,16 +5,29 @@ import numpy as np
 FLOATS = (np.dtype(np.float32), np.dtype(np.float64))
 
 
+def unmasked(name, values):
+    """``values`` without a mask that hides nothing; one that hides something is refused."""
+    if not np.ma.isMaskedArray(values):
+        return values
+    if np.ma.is_masked(values):
+        raise ValueError(
+            f"{name} is masked, {int(np.ma.count_masked(values))} of {values.size} numbers; take "
+            f"them out, or give {name}.filled(...)"
+        )
+    return values.data
+
+
 def numbers(name, values):
     """``values`` as an array of real numbers, copied only if it is none yet."""
+    values = unmasked(name, values)
     try:
         array = np.asarray(values)
     except ValueError as error:
         raise ValueError(f"{name} is no array: {error}; give rows of equal length") from None
+    if array.dtype.kind in "US" and array.ndim == 0:
+        raise TypeError(f"{name} is {values!r}; give numbers")
     if array.dtype.kind not in "fiu":
-        raise TypeError(
-            f"{name} has dtype {array.dtype}; give float32 or float64"
-        )
+        raise TypeError(f"{name} has dtype {array.dtype}; give float32 or float64")
     return array
 
 
@@ -24,7 +37,12 @@ def rows_of_three(name, values):
     if array.ndim != 2 or array.shape[1] != 3:
         if array.size == 0 and array.ndim <= 2:
             return array.reshape(0, 3)
-        raise ValueError(f"{name} has shape {array.shape}; give (N, 3)")
+        cure = ""
+        if array.shape == (3,):
+            cure = f", a single row as [{name}]"
+        elif array.ndim == 2 and array.shape[0] == 3:
+            cure = f", perhaps {name}.T"
+        raise ValueError(f"{name} has shape {array.shape}; give (N, 3){cure}")
     return array
 
 
@@ -82,6 +100,7 @@ def vertices(values):
 
 def triangles(values, vertex_count):
     """uint32 indices in C order, and what was copied and why."""
+    values = unmasked("triangles", values)
     try:
         given = np.asarray(values)
     except ValueError as error:
@@ -95,9 +114,10 @@ def triangles(values, vertex_count):
     for value in (given.min(), given.max()):
         if value < 0 or value >= vertex_count:
             row = int(np.argwhere(given == value)[0, 0])
+            cure = f"give 0 to {vertex_count - 1}" if vertex_count else "give vertices"
             raise IndexError(
                 f"triangles[{row}] has the index {value}, and there are {vertex_count} vertices; "
-                f"give 0 to {vertex_count - 1}"
+                f"{cure}"
             )
     if given.dtype == np.int32:
         same = given.view(np.uint32)
@@ -114,12 +134,35 @@ def triangles(values, vertex_count):
 
 def scalar(name, value, rule, accepts):
     """A number that ``accepts`` takes."""
-    if isinstance(value, (bool, str)) or not np.isscalar(value):
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        value = value[()]
+    if isinstance(value, (bool, np.bool_, str, complex)) or not np.isscalar(value):
         raise TypeError(f"{name} is {value!r}; give a number")
     value = float(value)
     if not accepts(value):
         raise ValueError(f"{name} is {value}; give {rule}")
     return value
+
+
+def positive(name, value):
+    return scalar(name, value, "a positive finite number", lambda v: 0 < v < np.inf)
+
+
+def vector(name, value):
+    """Three finite numbers."""
+    array = numbers(name, value)
+    if array.shape != (3,) or not np.isfinite(array).all():
+        raise ValueError(f"{name} is {value!r}; give three finite numbers")
+    return tuple(float(v) for v in array)
+
+
+def whole(name, value, least, most):
+    """A whole number."""
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)):
+        raise TypeError(f"{name} is {value!r}; give a whole number")
+    if not least <= value <= most:
+        raise ValueError(f"{name} is {value}; give {least} to {most}")
+    return int(value)
 
 
 def threads(value):

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rt_core import _arrays, _png
+from rt_core._camera import Camera, seen_from_outside
 from rt_core._rt_core import Stage
 
 #: Viridis at nine places, linear between, as sRGB.
@@ -30,8 +31,9 @@ def _color_map(colors):
 
 def _rgba(name, array):
     array = array.astype(np.float32)
-    if not np.isfinite(array).all():
-        raise ValueError(f"{name} has a number that is not finite; give 0 to 1")
+    if not ((array >= 0) & (array <= 1)).all():
+        wrong = array[~((array >= 0) & (array <= 1))][0]
+        raise ValueError(f"{name} has the number {wrong:g}; give 0 to 1, linear RGB")
     if array.shape[1] == 3:
         array = np.column_stack([array, np.ones(len(array), dtype=np.float32)])
     return np.ascontiguousarray(array).reshape(-1)
@@ -39,32 +41,21 @@ def _rgba(name, array):
 
 def _color(value):
     array = _arrays.numbers("color", value)
-    if array.shape != (3,) or not np.isfinite(array).all() or (array < 0).any():
+    if array.shape != (3,) or not ((array >= 0) & (array <= 1)).all():
         raise ValueError(f"color is {value!r}; give three numbers from 0 to 1, linear RGB")
     return tuple(array.tolist())
-
-
-def _positive(name, value):
-    return _arrays.scalar(name, value, "a positive finite number", lambda v: 0 < v < np.inf)
 
 
 def _unit(name, value):
     return _arrays.scalar(name, value, "0 to 1", lambda v: 0 <= v <= 1)
 
 
-def _vector(name, value):
-    array = _arrays.numbers(name, value)
-    if array.shape != (3,) or not np.isfinite(array).all():
-        raise ValueError(f"{name} is {value!r}; give three finite numbers")
-    return tuple(float(v) for v in array)
-
-
 def _values(name, values, counts):
     """One number for each element, of which there may be several counts."""
     array = _arrays.numbers(name, values)
     if array.ndim != 1 or len(array) not in counts:
-        some = " or ".join(str(c) for c in counts)
-        raise ValueError(f"{name} has shape {array.shape}; give ({some},)")
+        some = " or ".join(f"({c},)" for c in dict.fromkeys(counts))
+        raise ValueError(f"{name} has shape {array.shape}; give {some}")
     return array.astype(np.float32)
 
 
@@ -114,8 +105,8 @@ class _Look:
             colors = _arrays.numbers("colors", self.colors)
             wrong = colors.ndim != 2 or colors.shape[1] not in (3, 4)
             if wrong or len(colors) not in counts:
-                some = " or ".join(str(c) for c in counts)
-                raise ValueError(f"colors has shape {colors.shape}; give ({some}, 3 or 4)")
+                some = " or ".join(f"({c}, 3 or 4)" for c in dict.fromkeys(counts))
+                raise ValueError(f"colors has shape {colors.shape}; give {some}")
             thing["colors"] = _rgba("colors", colors)
         return thing
 
@@ -243,14 +234,17 @@ def _grid(values, spacing, origin):
         raise ValueError(f"values has shape {array.shape}; give (NX, NY, NZ), two or more each way")
     if max(array.shape) >= 2**31:
         raise ValueError(f"values has shape {array.shape}; give less than 2**31 each way")
-    spacing = np.broadcast_to(_arrays.numbers("spacing", spacing), (3,))
+    spacing = _arrays.numbers("spacing", spacing)
+    if spacing.shape not in ((), (1,), (3,)):
+        raise ValueError(f"spacing has shape {spacing.shape}; give one number, or three")
+    spacing = np.broadcast_to(spacing, (3,))
     if not (np.isfinite(spacing) & (spacing > 0)).all():
         raise ValueError(f"spacing is {spacing.tolist()}; give positive finite numbers")
     return {
         "values": array.ravel(order="F").astype(np.float32, copy=False),
         "dims": array.shape,
         "spacing": tuple(float(s) for s in spacing),
-        "origin": _vector("origin", origin),
+        "origin": _arrays.vector("origin", origin),
     }
 
 
@@ -320,43 +314,9 @@ class Volume:
         if points.ndim != 2 or points.shape[1] != 2 or len(points) == 0:
             raise ValueError(f"opacity has shape {points.shape}; give (K, 2)")
         thing = {"kind": "volume", "opacity_points": points.astype(np.float32).reshape(-1)}
-        thing["unit_distance"] = _positive("unit_distance", self.unit_distance)
+        thing["unit_distance"] = _arrays.positive("unit_distance", self.unit_distance)
         grid = _grid(self.values, self.spacing, self.origin)
         return thing | grid | _Look._map(self, grid["values"])
-
-
-@dataclass(frozen=True)
-class Camera:
-    """A point of view.
-
-    Parameters
-    ----------
-    eye, target, up : three floats
-    fov : float
-        Full vertical angle in degrees.
-    height : float, optional
-        For a parallel projection: the height of the image in units of the world, instead of `fov`.
-    near, far : float, optional
-        Distances whose depths are 0 and 1; found from the eye and the target by default.
-    """
-
-    eye: tuple
-    target: tuple
-    up: tuple = (0.0, 0.0, 1.0)
-    fov: float = 30.0
-    height: float | None = None
-    near: float | None = None
-    far: float | None = None
-
-    def _numbers(self):
-        eye, target = _vector("eye", self.eye), _vector("target", self.target)
-        view = (eye, target, _vector("up", self.up))
-        distance = float(np.linalg.norm(np.subtract(target, eye)))
-        near = distance / 1000 if self.near is None else float(self.near)
-        far = distance * 1000 if self.far is None else float(self.far)
-        if self.height is not None:
-            return view, (_positive("height", self.height), True, (near, far))
-        return view, (float(np.radians(self.fov)), False, (near, far))
 
 
 @dataclass(frozen=True)
@@ -397,18 +357,13 @@ class Picture:
         _png.write(path, self.rgba8)
 
 
-def _seen_from_outside(bounds, size):
-    """A camera that sees everything, from above and the side."""
-    if bounds is None:
-        return Camera((0.0, 0.0, 1.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0))
-    low, high = np.array(bounds)
-    radius = max(float(np.linalg.norm(high - low)) / 2, 1e-30)
-    target = (low + high) / 2
-    half = np.arctan(np.tan(np.radians(15)) * min(1, size[0] / size[1]))
-    distance = radius / np.sin(half)
-    eye = target + distance * np.array([0.48, -0.72, 0.5]) / np.linalg.norm([0.48, -0.72, 0.5])
-    near = max(distance - radius, distance / 1000) * 0.99
-    return Camera(tuple(eye), tuple(target), near=near, far=(distance + radius) * 1.01)
+def _size(size):
+    """Width and height in pixels."""
+    try:
+        width, height = size
+    except (TypeError, ValueError):
+        raise ValueError(f"size is {size!r}; give width and height in pixels") from None
+    return tuple(_arrays.whole(f"size[{i}]", s, 1, 65536) for i, s in enumerate((width, height)))
 
 
 def render(
@@ -471,43 +426,29 @@ def render(
             raise type(error)(f"object {number}: {error}") from None
     # The world numbers surfaces alone.
     surfaces = [n for n, t in enumerate(things) if t["kind"] != "volume"]
-    if (
-        not isinstance(size, (tuple, list))
-        or len(size) != 2
-        or not all(isinstance(s, (int, np.integer)) and 1 <= s <= 65536 for s in size)
-    ):
-        raise ValueError(f"size is {size!r}; give width and height, 1 to 65536 pixels")
-    if isinstance(samples, bool) or not isinstance(samples, (int, np.integer)):
-        raise TypeError(f"samples is {samples!r}; give a whole number")
-    if not 1 <= samples < 2**31:
-        raise ValueError(f"samples is {samples}; give 1 or more")
-    if not isinstance(seed, (int, np.integer)) or not 0 <= seed < 2**64:
-        raise ValueError(f"seed is {seed!r}; give a whole number from 0 to 2**64 - 1")
+    width, height = _size(size)
+    samples = _arrays.whole("samples", samples, 1, 2**31 - 1)
+    seed = _arrays.whole("seed", seed, 0, 2**64 - 1)
     if ambient_occlusion is not None:
         try:
             distance, count = ambient_occlusion
-            count = int(count)
         except (TypeError, ValueError):
             raise TypeError(
                 f"ambient_occlusion is {ambient_occlusion!r}; give a distance and a number of rays"
             ) from None
-        if not 1 <= count < 2**31:
-            raise ValueError(f"ambient_occlusion has {count} rays; give 1 or more")
-        distance = _arrays.scalar("ambient_occlusion", distance, "above 0", lambda v: v > 0)
+        count = _arrays.whole("ambient_occlusion[1]", count, 1, 2**31 - 1)
+        distance = _arrays.scalar("ambient_occlusion[0]", distance, "above 0", lambda v: v > 0)
         ambient_occlusion = (distance, count)
         ambient = ambient or 0.5
-    towards = [_vector(f"lights[{i}]", light) for i, light in enumerate(lights)]
+    towards = [_arrays.vector(f"lights[{i}]", light) for i, light in enumerate(lights)]
     threads = _arrays.threads(threads)
     stage = Stage(things, towards, _unit("ambient", ambient), ambient_occlusion, threads)
     if camera is None:
-        camera = _seen_from_outside(stage.bounds, size)
+        camera = seen_from_outside(stage.bounds, (width, height))
     elif not isinstance(camera, Camera):
         raise TypeError(f"camera is of type {type(camera).__name__}; give rt_core.Camera")
     view, lens = camera._numbers()
-    width, height = (int(s) for s in size)
-    layers, warnings = stage.render(
-        view, lens, (width, height), int(samples), int(seed), threads
-    )
+    layers, warnings = stage.render(view, lens, (width, height), samples, seed, threads)
     shaped = {
         name: a.reshape((height, width) if a.size == width * height else (height, width, -1))
         for name, a in layers

@@ -4,6 +4,7 @@ from numpy.typing import NDArray
 NO_HIT: int
 
 def count_threads() -> int: ...
+def count_stopped_calls() -> int: ...
 
 class World:
     triangles: int

@@ -141,8 +141,20 @@ class Scene:
         >>> scene.split(hits.primitive)
         (array([1]), array([0]))
         """
+        try:
+            meshes = list(meshes)
+        except TypeError:
+            raise TypeError(
+                f"meshes is {meshes!r}; give a list of pairs of vertices and triangles"
+            ) from None
         made = []
-        for number, (vertices, triangles) in enumerate(meshes):
+        for number, mesh in enumerate(meshes):
+            if not isinstance(mesh, (tuple, list)) or len(mesh) != 2:
+                raise TypeError(
+                    f"mesh {number} is of type {type(mesh).__name__}; give a pair of vertices and "
+                    "triangles"
+                )
+            vertices, triangles = mesh
             try:
                 made.append(_mesh(vertices, triangles))
             except (TypeError, ValueError, IndexError) as error:
@@ -204,8 +216,22 @@ class Scene:
         -------
         mesh, triangle : ndarray of int64
             -1 where `primitive` is `rt_core.NO_HIT`.
+
+        Raises
+        ------
+        IndexError
+            For a number that no triangle of this scene has.
         """
-        primitive = np.asarray(primitive).astype(np.int64)
+        primitive = np.asarray(primitive)
+        if primitive.dtype.kind not in "iu" and primitive.size:
+            raise TypeError(f"primitive has dtype {primitive.dtype}; give an integer type")
+        primitive = primitive.astype(np.int64)
+        wrong = (primitive != NO_HIT) & ((primitive < 0) | (primitive >= self.num_triangles))
+        if wrong.any():
+            raise IndexError(
+                f"primitive has {primitive[wrong].flat[0]}, and there are {self.num_triangles} "
+                "triangles; give numbers that this scene has answered"
+            )
         mesh = np.searchsorted(self._firsts, primitive, side="right") - 1
         missed = primitive == NO_HIT
         triangle = primitive - self._firsts[np.minimum(mesh, len(self._meshes))]

@@ -19,6 +19,7 @@ from collections import OrderedDict
 
 import numpy as np
 
+from rt_core._places import on_planes
 from rt_core._scene import Scene
 
 #: Trees that are kept, those used last.
@@ -56,7 +57,14 @@ class Surface:
             faces = surface.regular_faces
             # Only polygons are left; they are in the order of their cells.
             self.cells = np.asarray(surface.cell_data["rt_core cell"])[-len(faces) or None :]
-        self.scene = Scene(np.asarray(surface.points), surface.regular_faces)
+        self._points, self._faces = np.asarray(surface.points), surface.regular_faces
+        self.scene = Scene(self._points, self._faces)
+
+    def places(self, origins, directions, t, primitive, uv):
+        """Where rays meet their triangles, in float64."""
+        # Without triangles there are no faces of three.
+        corners = self._points[self._faces.reshape(-1, 3)[primitive]].astype(np.float64)
+        return on_planes(origins, directions, t, uv, corners)
 
 
 def surface_of(mesh):
@@ -102,12 +110,19 @@ def ray_trace(mesh, origin, end_point, first_point=False):
     for name, end in zip(("origin", "end_point"), ends):
         if end.shape != (3,):
             raise ValueError(f"{name} has shape {end.shape}; give three numbers")
+        if not np.isfinite(end).all():
+            raise ValueError(f"{name} is {end.tolist()}; give finite numbers")
     start, way = ends[0], ends[1] - ends[0]
+    if not way.any():
+        # Nothing is crossed on the way to the same place.
+        return np.empty((0, 3)), np.empty(0, dtype=np.int64)
     surface = surface_of(mesh)
     # The end belongs to the segment.
     limit = np.nextafter(1.0, 2.0)
     hits = surface.scene.all_hits(start[None], way[None], t_max=limit)
-    points = start + hits.t[:, None] * way
+    of_hits = (len(hits.t), 3)
+    starts, ways = np.broadcast_to(start, of_hits), np.broadcast_to(way, of_hits)
+    points = surface.places(starts, ways, hits.t, hits.primitive, hits.uv)
     cells = _cells(surface, hits.primitive)
     if first_point and len(points):
         points = points[0]
@@ -138,11 +153,13 @@ def multi_ray_trace(mesh, origins, directions, first_point=False, retry=False):
     if first_point:
         hits = surface.scene.cast(origins, directions)
         rays = np.flatnonzero(hits.hit)
-        t, primitive = hits.t[rays], hits.primitive[rays]
+        t, primitive, uv = hits.t[rays], hits.primitive[rays], hits.uv[rays]
     else:
         hits = surface.scene.all_hits(origins, directions)
-        rays, t, primitive = hits.ray, hits.t, hits.primitive
-    points = origins[rays] + t[:, None] * directions[rays]
+        rays, t, primitive, uv = hits.ray, hits.t, hits.primitive, hits.uv
+    # An empty list has one dimension.
+    starts, ways = origins.reshape(-1, 3)[rays], directions.reshape(-1, 3)[rays]
+    points = surface.places(starts, ways, t, primitive, uv)
     return points, rays, _cells(surface, primitive)
 
 

@@ -14,6 +14,7 @@ array([ True, False])
 
 import numpy as np
 
+from rt_core._places import on_planes
 from rt_core._scene import Scene
 
 
@@ -31,6 +32,13 @@ def install():
     trimesh.ray.ray_pyembree = here
     trimesh.ray.has_embree = True
     sys.modules["trimesh.ray.ray_pyembree"] = here
+
+
+def _rows(name, values):
+    array = np.array(values, dtype=np.float64)
+    if array.size % 3 or array.ndim > 2 or (array.ndim == 2 and array.size and array.shape[1] != 3):
+        raise ValueError(f"{name} has shape {array.shape}; give (n, 3)")
+    return array.reshape(-1, 3)
 
 
 class RayMeshIntersector:
@@ -63,8 +71,8 @@ class RayMeshIntersector:
 
     def _rays(self, ray_origins, ray_directions):
         """Rays with directions of unit length, and which of them can be cast."""
-        origins = np.array(ray_origins, dtype=np.float64).reshape(-1, 3)
-        directions = np.array(ray_directions, dtype=np.float64).reshape(-1, 3)
+        origins = _rows("ray_origins", ray_origins)
+        directions = _rows("ray_directions", ray_directions)
         if origins.shape != directions.shape:
             raise ValueError(
                 f"ray_origins has {len(origins)} rows and ray_directions has {len(directions)}; "
@@ -123,19 +131,7 @@ class RayMeshIntersector:
     def _locations(self, origins, directions, t, triangles, uv):
         """Where rays meet the planes of their triangles, in float64."""
         corners = np.asarray(self.mesh.triangles, dtype=np.float64)[triangles]
-        first = corners[:, 0]
-        e1, e2 = corners[:, 1] - first, corners[:, 2] - first
-        normals = np.cross(e1, e2)
-        along = np.einsum("ij,ij->i", directions, normals)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            exact = np.einsum("ij,ij->i", first - origins, normals) / along
-        # Along a plane the quotient says nothing: the triangle's own coordinates do.
-        size = np.linalg.norm(normals, axis=1)
-        steep = np.abs(along) > 1e-6 * size
-        at_plane = origins + directions * np.where(steep, exact, t)[:, None]
-        weights = uv.astype(np.float64)
-        inside = first + e1 * weights[:, :1] + e2 * weights[:, 1:]
-        return np.where(steep[:, None], at_plane, inside)
+        return on_planes(origins, directions, t, uv, corners)
 
     def intersects_location(self, ray_origins, ray_directions, multiple_hits=True):
         """Where rays hit.
@@ -168,7 +164,7 @@ class RayMeshIntersector:
 
     def contains_points(self, points):
         """Whether each point lies inside the mesh, which must be closed."""
-        return self._scene.contains(np.array(points, dtype=np.float64).reshape(-1, 3))
+        return self._scene.contains(_rows("points", points))
 
     def __getstate__(self):
         return {"mesh": self.mesh, "_scale_to_box": self._scale_to_box}

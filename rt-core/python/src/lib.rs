@@ -20,7 +20,7 @@ mod _rt_core {
     #[pymodule_export]
     use super::stage::Stage;
     #[pymodule_export]
-    use super::work::count_threads;
+    use super::work::{count_stopped_calls, count_threads};
     #[pymodule_export]
     use super::world::World;
     #[pymodule_export]

@@ -13,7 +13,7 @@ use rt_core::grid::Grid;
 use rt_core::light::Light;
 use rt_core::material::{ColorSource, Material};
 use rt_core::mesh::{Attribute, TriMesh};
-use rt_core::render::{RenderOptions, render};
+use rt_core::render::{RenderOptions, StopReason, render};
 use rt_core::scene::{AmbientOcclusion, Scene, SceneBuilder};
 use rt_core::shapes::{Isosurface, IsosurfaceNormals, IsosurfaceOptions, Radii, Spheres, Tubes};
 use rt_core::transfer_function::TransferFunction;
@@ -280,7 +280,11 @@ impl Stage {
         };
         let work = |stop: &Stop| {
             let options = RenderOptions { cancel: Some(stop.flag()), ..options };
-            render(&self.0, &camera, &options)
+            let rendered = render(&self.0, &camera, &options);
+            if rendered.as_ref().is_ok_and(|o| o.report.stopped == StopReason::Cancelled) {
+                stop.note();
+            }
+            rendered
         };
         let output = run(py, threads, Length::Long, work)?.map_err(refused)?;
         let rgba8 = output.frame.to_rgba8(Encoding::Srgb, 1.0);

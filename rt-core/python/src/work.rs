@@ -12,6 +12,12 @@ pub(crate) fn count_threads() -> usize {
     rt_core_python_work::count_threads()
 }
 
+/// Calls that Ctrl-C stopped before their end.
+#[pyfunction]
+pub(crate) fn count_stopped_calls() -> usize {
+    WORKERS.count_stopped()
+}
+
 /// Runs `work` without the interpreter ([`Workers::run`]).
 pub(crate) fn run<R: Send>(
     py: Python<'_>,

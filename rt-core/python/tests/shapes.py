@@ -30,3 +30,12 @@ def rays(count, seed=1, dtype=np.float32):
     origins *= 3 / np.linalg.norm(origins, axis=1, keepdims=True)
     directions = rng.uniform(-1.2, 1.2, size=(count, 3)) - origins
     return origins.astype(dtype), directions.astype(dtype)
+
+
+def slivers(count):
+    """Thin triangles along one diagonal of a square, one above the other: each one's box is the
+    whole square."""
+    z = np.repeat(np.linspace(0, 1, count, dtype=np.float32), 3)
+    corner = np.float32([[0, 0], [1, 1], [1, 1 - 1e-4]])
+    vertices = np.column_stack([np.tile(corner, (count, 1)), z])
+    return np.ascontiguousarray(vertices), np.arange(3 * count, dtype=np.uint32).reshape(-1, 3)

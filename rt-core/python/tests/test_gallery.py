@@ -7,7 +7,14 @@ from pathlib import Path
 import pytest
 
 GALLERY = Path(__file__).parent.parent / "gallery"
-NEEDED = {"wall_thickness": ("trimesh",), "ambient_occlusion": ("pyvista",)}
+NEEDED = {
+    "ambient_occlusion": ("pyvista",),
+    "depth_maps": ("matplotlib",),
+    "streamlines": ("matplotlib",),
+    "sunlight": ("matplotlib",),
+    "volume": ("matplotlib",),
+    "wall_thickness": ("trimesh", "matplotlib"),
+}
 
 
 @pytest.mark.parametrize("script", sorted(GALLERY.glob("*.py")), ids=lambda s: s.stem)

@@ -91,3 +91,28 @@ def test_refusals():
         adapter.ray_trace(pyvista.Sphere(), [0, 0, 0], [[0, 0, 1]])
     with pytest.raises(ValueError, match="origins has 1"):
         adapter.multi_ray_trace(pyvista.Sphere(), [[0, 0, 0]], [[0, 0, 1]] * 2)
+
+
+def test_points_lie_on_the_triangles_and_not_where_rounded_distances_end():
+    """Far away a distance in float32 is known to some micrometres only."""
+    grid = pyvista.ImageData(dimensions=(4, 4, 4))
+    for shift in (9.0, 1e3):
+        points, _, _ = adapter.multi_ray_trace(
+            grid, [[0.11, 0.23, shift]], [[0, 0, -1]]
+        )
+        np.testing.assert_array_equal(points[:, 2], [3, 0])
+        points, _ = adapter.ray_trace(grid, [0.11, 0.23, shift], [0.11, 0.23, -shift])
+        np.testing.assert_array_equal(points[:, 2], [3, 0])
+
+
+def test_segments_without_length_and_meshes_without_faces_cross_nothing():
+    ball = pyvista.Sphere()
+    points, cells = adapter.ray_trace(ball, [0, 0, 1], [0, 0, 1])
+    assert points.shape == (0, 3) and cells.shape == (0,)
+    with pytest.raises(ValueError, match="origin is .*nan.*finite"):
+        adapter.ray_trace(ball, [0, 0, np.nan], [0, 0, 1])
+    for empty in (pyvista.PolyData(), pyvista.Line(), pyvista.PolyData([[0.0, 0, 0]])):
+        for first in (True, False):
+            found = adapter.multi_ray_trace(empty, [[0, 0, 1]], [[0, 0, -1]], first)
+            assert found[0].shape == (0, 3) and len(found[1]) == len(found[2]) == 0
+    assert adapter.multi_ray_trace(ball, [], [])[0].shape == (0, 3)

@@ -89,3 +89,11 @@ def test_installed_for_new_meshes(monkeypatch):
     assert isinstance(trimesh.creation.box().ray, RayMeshIntersector)
     slow = trimesh.Trimesh(*[[[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]], use_embree=False)
     assert not isinstance(slow.ray, RayMeshIntersector)
+
+
+def test_shapes_that_are_no_rows_are_named():
+    ours = RayMeshIntersector(trimesh.creation.box())
+    with pytest.raises(ValueError, match=r"ray_origins has shape \(1, 2\); give \(n, 3\)"):
+        ours.intersects_any([[0, 0]], [[0, 1]])
+    with pytest.raises(ValueError, match=r"points has shape \(3, 2\)"):
+        ours.contains_points([[0, 0]] * 3)

@@ -17,7 +17,8 @@ Examples
 from schlieren._field import Field, series
 from schlieren._image import Image, Report
 from schlieren._index import Index, index
-from schlieren._render import Probe, probe, render, show, stream, sweep
+from schlieren._probe import Probe, probe
+from schlieren._render import render, show, stream, sweep
 from schlieren._schlieren import count_threads
 from schlieren._techniques import (
     BOS,

@@ -7,14 +7,14 @@ import numbers
 import numpy as np
 
 
-def array(name, values):
-    """``values`` as an array of real numbers that the native module takes."""
+def array(name, values, cure="give {}.filled(numpy.nan), and nan='blank' for cells without data"):
+    """``values`` as an array of real numbers that the native module takes.
+
+    `cure`: what to do with those that are masked.
+    """
     if np.ma.isMaskedArray(values):
         if np.ma.is_masked(values):
-            raise ValueError(
-                f"{name} is masked; give {name}.filled(numpy.nan), and nan='blank' for cells "
-                "without data"
-            )
+            raise ValueError(f"{name} is masked; {cure.format(name)}")
         values = values.data
     try:
         found = np.asarray(values)
@@ -73,6 +73,14 @@ def whole(name, value, least=0, most=2**32 - 1):
     if not least <= value <= most:
         raise ValueError(f"{name} is {value}; give {least} to {most}")
     return int(value)
+
+
+def items(name, values, cure):
+    """What an iterable has, in a list."""
+    try:
+        return list(values)
+    except TypeError:
+        raise TypeError(f"{name} is {values!r}; {cure}") from None
 
 
 def several(name, values, count):

@@ -131,6 +131,14 @@ class Image:
         self.pixel_m = output.pixel_m
         self.swept = None
 
+    def __reduce__(self):
+        raise TypeError("an Image does not pickle; send its arrays, or save() it")
+
+    def __copy__(self):
+        copied = Image(self._output)
+        copied.swept = self.swept
+        return copied
+
     def __getattr__(self, name):
         if name.startswith("_"):
             raise AttributeError(name)

@@ -75,7 +75,8 @@ def index(
     if density_kg_m3 is not None:
         given["density_kg_m3"] = density_kg_m3
     given |= {f"species[{gas!r}]": part for gas, part in species.items()}
-    arrays = {name: _arrays.array(name, value) for name, value in given.items()}
+    cure = "give {}.compressed()"
+    arrays = {name: _arrays.array(name, value, cure) for name, value in given.items()}
     for name, array in arrays.items():
         if not np.isfinite(array).all():
             raise ValueError(f"{name} has a number that is not finite; give finite numbers")

@@ -4,7 +4,6 @@ import dataclasses
 import json
 import os
 import sys
-from dataclasses import dataclass
 
 from schlieren import _arrays, _words
 from schlieren._field import Field
@@ -25,14 +24,16 @@ def _view(view):
 def _wavelengths(wavelength_nm):
     if _arrays.is_number(wavelength_nm):
         return [_arrays.positive("wavelength_nm", wavelength_nm)]
-    found = [_arrays.positive(f"wavelength_nm[{i}]", w) for i, w in enumerate(wavelength_nm)]
+    given = _arrays.items("wavelength_nm", wavelength_nm, "give a number, or several, such as 633")
+    found = [_arrays.positive(f"wavelength_nm[{i}]", w) for i, w in enumerate(given)]
     if not found:
         raise ValueError("wavelength_nm is empty; give one or more, such as 633")
     return found
 
 
 def _layers(layers):
-    names = [layers] if isinstance(layers, str) else list(layers)
+    cure = f"give some of {', '.join(map(repr, LAYERS))}, or () for none"
+    names = [layers] if isinstance(layers, str) else _arrays.items("layers", layers, cure)
     for name in names:
         _arrays.one_of("layers", name, (*LAYERS, "all"))
     chosen = set(LAYERS if "all" in names else names)
@@ -344,6 +345,8 @@ def sweep(field, argument, values, technique="schlieren", **options):
             f"{_arrays.meant(first, ARGUMENTS)}"
         )
     _arrays.known("sweep", options, ARGUMENTS)
+    if not hasattr(values, "__iter__") or isinstance(values, str):
+        raise TypeError(f"values is {values!r}; give several, such as [{values!r}]")
     return _swept(field, argument, values, options | {"technique": technique})
 
 
@@ -380,6 +383,11 @@ def stream(fields, technique="schlieren", **options):
     Image
     """
     _arrays.known("stream", options, ARGUMENTS)
+    if not hasattr(fields, "__iter__"):
+        raise TypeError(
+            f"fields is of type {type(fields).__name__}; give an iterable of schlieren.Field, such "
+            "as schlieren.series(paths, ...)"
+        )
     return _streamed(fields, technique, dict(options))
 
 
@@ -391,86 +399,6 @@ def _streamed(fields, technique, options):
         if options.get("reference_n_minus_1") is None:
             options["reference_n_minus_1"] = image.report.reference_n_minus_1
         yield image
-
-
-@dataclass(frozen=True)
-class Probe:
-    """The ray of one point of an image.
-
-    Attributes
-    ----------
-    pixel : (float, float)
-        Column and row from the upper left; (0.5, 0.5) is the first pixel's centre.
-    status : str
-        What becomes of the ray.
-    start_m, direction : tuple of float
-        The undisturbed ray.
-    deflection_rad, exit_displacement_m : (float, float)
-        Along the image's right and up.
-    exit_depth_m : float
-    path_difference_m, phase_waves : float
-    film_shift_m, film_shift_px : (float, float)
-    cutoff_point_m : (float, float)
-    transmission : float
-    energy : (float, float, float)
-    march : str
-    deflection_error_rad : float or None
-    left_out : dict or None
-        With `skip_rad`: how much was skipped.
-    warnings : tuple of str
-    optical_depth, emission, rotation_rad : float or None
-    """
-
-    pixel: tuple
-    status: str
-    start_m: tuple
-    direction: tuple
-    deflection_rad: tuple
-    exit_displacement_m: tuple
-    exit_depth_m: float
-    path_difference_m: float
-    phase_waves: float
-    film_shift_m: tuple
-    film_shift_px: tuple
-    cutoff_point_m: tuple
-    transmission: float
-    energy: tuple
-    march: str
-    deflection_error_rad: float | None
-    left_out: dict | None
-    warnings: tuple
-    optical_depth: float | None = None
-    emission: float | None = None
-    rotation_rad: float | None = None
-
-
-def probe(field, pixel, technique="schlieren", *, threads=None, **options):
-    """Traces the ray of one point of the image.
-
-    Parameters
-    ----------
-    field : Field
-    pixel : (float, float)
-        Column and row from the upper left; (0.5, 0.5) is the first pixel's centre.
-    technique, threads, **options
-        As for `render`.
-
-    Returns
-    -------
-    Probe
-    """
-    _arrays.known("probe", options, ARGUMENTS - {"layers"})
-    scene = _scene(field, technique, **options)
-    kind = json.loads(scene)["technique"]["kind"]
-    if kind in ("volume", "slice"):
-        raise ValueError(f"technique is {kind!r}, which traces no light; give another")
-    place = tuple(_arrays.several("pixel", pixel, 2))
-    try:
-        found = json.loads(field._native.probe(scene, place, _arrays.threads(threads)))
-    except ValueError as error:
-        raise _words.raised(error) from None
-    _words.warn(found["warnings"], 2)
-    return Probe(**{k: tuple(v) if isinstance(v, list) else v for k, v in found.items()})
 
 
 def show(field, technique="schlieren", **options):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from schlieren import _arrays
+from schlieren import _arrays, _words
 
 _KINDS = {
     "vtkImageData": "ImageData",
@@ -131,6 +131,11 @@ def dictionary(data, used):
         raise TypeError(f"data is of type {type(data).__name__}; give a data set of VTK or PyVista")
     if data.IsA("vtkCompositeDataSet"):
         leaves = [d for d in _blocks(data) if d is not None]
+        surfaces = [d for d in leaves if d.IsA("vtkPolyData")]
+        # As readers of OpenFOAM give them: the patches of the border beside the mesh.
+        if surfaces and len(surfaces) < len(leaves):
+            leaves = [d for d in leaves if not d.IsA("vtkPolyData")]
+            _words.warn([f"{len(surfaces)} blocks are surfaces and are left out"], 3)
     else:
         leaves = [data]
     names = {name for leaf in leaves if hasattr(leaf, "GetPointData") for name in _names(leaf)}

@@ -3,7 +3,8 @@
 import numpy as np
 
 from schlieren import _arrays, _units
-from schlieren._field import MEANING, OPTIONS, UNITS, Meaning, _Lattice
+from schlieren._field import _Lattice
+from schlieren._meaning import MEANING, OPTIONS, UNITS, Meaning
 
 #: The unit of a role, and whether the scene converts it.
 _UNIT_OF = {
@@ -30,6 +31,8 @@ def _axes(data, dims):
                     f"dims has {dim!r}{_arrays.meant(str(dim), map(str, data.dims))}; "
                     f"there are: {', '.join(map(repr, data.dims))}"
                 )
+        if len(set(dims)) < len(dims):
+            raise ValueError(f"dims has {dims}; give each dimension once")
         return dims
     found = {}
     for dim in data.dims:

@@ -13,7 +13,7 @@ use schlieren::render::{Control, Layers, RenderError, TestSection, render};
 use schlieren::scene::Scene;
 use schlieren::solids::Solids;
 use std::path::PathBuf;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, TryLockError};
 use std::time::Instant;
 
 /// The data of a flow.
@@ -54,8 +54,18 @@ impl Flow {
         Flow { data, notes, kept: Mutex::new(None) }
     }
 
+    /// The place of the kept section; `None` while another thread has it. It is never waited for:
+    /// in a forked child that thread may not exist, and the place is then locked for ever.
+    fn place(&self) -> Option<MutexGuard<'_, Option<Kept>>> {
+        match self.kept.try_lock() {
+            Ok(place) => Some(place),
+            Err(TryLockError::Poisoned(place)) => Some(place.into_inner()),
+            Err(TryLockError::WouldBlock) => None,
+        }
+    }
+
     fn take_kept(&self) -> Option<Kept> {
-        self.kept.lock().unwrap_or_else(PoisonError::into_inner).take()
+        self.place()?.take()
     }
 
     /// The test section for a scene; the one kept if it is of the same flow and light.
@@ -83,7 +93,9 @@ impl Flow {
     }
 
     fn keep(&self, of: String, section: TestSection) {
-        *self.kept.lock().unwrap_or_else(PoisonError::into_inner) = Some(Kept { of, section });
+        if let Some(mut place) = self.place() {
+            *place = Some(Kept { of, section });
+        }
     }
 }
 
@@ -137,6 +149,9 @@ impl Flow {
             let flag = stop.flag();
             let control = Control { cancel: &flag, ..Control::default() };
             let rendered = render(&scene, &section, layers, &control);
+            if matches!(rendered, Err(RenderError::Cancelled)) {
+                stop.note();
+            }
             let rendered = rendered.map_err(|e| errors::of_render(&e))?;
             let seconds = [read_secs, start.elapsed().as_secs_f64() - read_secs];
             let input = section.input.clone();

@@ -1,13 +1,17 @@
 //! The index of refraction for conditions in arrays.
 
 use crate::errors;
-use crate::work::run;
+use crate::work::run_for;
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use rayon::prelude::*;
+use rt_core_python_work::{Length, Stop};
 use schlieren::index::conditions::{Conditions, IndexResult, Model, compute};
 use schlieren::index::{Gas, IndexError};
+
+/// Calls with fewer conditions are short.
+const MANY: usize = 1 << 12;
 
 type Floats<'py> = PyReadonlyArray1<'py, f64>;
 
@@ -52,7 +56,9 @@ pub(crate) fn index<'py>(
             model,
         })
     };
-    let found = run(py, 0, |_| (0..count).into_par_iter().map(of).collect::<Result<Vec<_>, _>>())?;
+    let all = |_: &Stop| (0..count).into_par_iter().map(of).collect::<Result<Vec<_>, _>>();
+    let length = if count < MANY { Length::Short } else { Length::Long };
+    let found = run_for(py, length, 0, all)?;
     let found = found.map_err(|e| errors::of(&e))?;
     let mut warnings: Vec<String> = Vec::new();
     let mut formula = String::new();

@@ -24,5 +24,5 @@ mod _schlieren {
     #[pymodule_export]
     use super::output::Output;
     #[pymodule_export]
-    use super::work::count_threads;
+    use super::work::{count_stopped_calls, count_threads};
 }

@@ -40,8 +40,8 @@ def _vtk():
         return False, f"cannot be imported ({error}); pip install vtk"
     version = vtkVersion.GetVTKVersion()
     major, minor = (int(n) for n in version.split(".")[:2])
-    if (major, minor) < (9, 3):
-        return False, f"{version} is older than 9.3; pip install --upgrade vtk"
+    if (major, minor) < (9, 4):
+        return False, f"{version} is older than 9.4; pip install --upgrade vtk"
     return True, version
 
 

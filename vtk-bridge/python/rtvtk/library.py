@@ -5,6 +5,8 @@ import os
 import numpy as np
 
 ABI = 67577348
+#: The first VTK whose renderers Python can replace.
+OLDEST_VTK = (9, 4)
 NONE, U8, F32, F64, I32, I64 = range(6)
 COLOR_PROPERTY, COLOR_POINTS, COLOR_CELLS, COLOR_MAPPED = range(4)
 LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SPOT = range(3)
@@ -193,8 +195,22 @@ def _functions(library, path):
     )
 
 
+def check_vtk(version):
+    """Raises `RtvError` for a VTK whose classes cannot be replaced from Python: 9.3 takes a
+    replacement and makes renderers of its own all the same."""
+    if tuple(version[:2]) < OLDEST_VTK:
+        named = ".".join(map(str, version))
+        oldest = ".".join(map(str, OLDEST_VTK))
+        cure = "pip install --upgrade vtk"
+        raise RtvError(f"VTK {named} is older than {oldest}, which rtvtk needs; {cure}")
+
+
 def set_host(major, minor, build):
-    """Loads the library and tells it the VTK version. Raises `RtvError` if it cannot be loaded."""
+    """Loads the library and tells it the VTK version.
+
+    Raises `RtvError` if it cannot be loaded, or VTK is too old.
+    """
+    check_vtk((major, minor, build))
     Bridge.calls()["host"](major, minor, build)
 
 

@@ -24,8 +24,13 @@ from vtkmodules.vtkRenderingCore import (
 def scene():
     """A ball above a plane, lit from the side."""
     renderer, window = vtkRenderer(), vtkRenderWindow()
-    plane = vtkPlaneSource(origin=(-2, -2, -0.6), point1=(2, -2, -0.6), point2=(-2, 2, -0.6))
-    for source in (vtkSphereSource(theta_resolution=64, phi_resolution=64), plane):
+    plane, ball = vtkPlaneSource(), vtkSphereSource()
+    plane.SetOrigin(-2, -2, -0.6)
+    plane.SetPoint1(2, -2, -0.6)
+    plane.SetPoint2(-2, 2, -0.6)
+    ball.SetThetaResolution(64)
+    ball.SetPhiResolution(64)
+    for source in (ball, plane):
         mapper, actor = vtkPolyDataMapper(), vtkActor()
         mapper.SetInputConnection(source.GetOutputPort())
         actor.SetMapper(mapper)

@@ -304,9 +304,12 @@ impl FoamFile {
         mut item: impl FnMut(&mut Self) -> Result<T, Fault>,
     ) -> Result<Vec<T>, Fault> {
         self.expect(b'(')?;
-        if let Some(n) = length {
-            // An item takes a digit and a separator.
-            fits(n, 2, self.bytes.len() - self.pos + 1, self.at(), "items")?;
+        // An item takes a digit and a separator.
+        let room = self.bytes.len() - self.pos + 1;
+        if let Some(n) = length.filter(|n| n.saturating_mul(2) > room as u64) {
+            // Only for the message: all lines before are counted for the place, and every face of a
+            // mesh is a list.
+            fits(n, 2, room, self.at(), "items")?;
         }
         let mut items = Vec::new();
         while self.peek() != Some(b')') {

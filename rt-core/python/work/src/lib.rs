@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::Duration;
 
@@ -30,6 +30,8 @@ pub struct Workers {
     /// Locked only by who holds the interpreter. `os.fork` holds it too, so no child begins with
     /// the lock taken.
     pools: Mutex<Pools>,
+    /// Calls whose work stopped early.
+    stopped: AtomicUsize,
 }
 
 /// The threads that `threads=None` stands for.
@@ -39,17 +41,30 @@ pub fn count_threads() -> usize {
 
 /// Tells work whether to stop early.
 #[derive(Default)]
-pub struct Stop(Arc<AtomicBool>);
+pub struct Stop {
+    asked: Arc<AtomicBool>,
+    /// Whether the work has seen it before its end.
+    seen: AtomicBool,
+}
 
 impl Stop {
-    /// Whether the work is to stop.
+    /// Whether the work is to stop, which it then does.
     pub fn is_asked(&self) -> bool {
-        self.0.load(Ordering::Relaxed)
+        let asked = self.asked.load(Ordering::Relaxed);
+        if asked {
+            self.seen.store(true, Ordering::Relaxed);
+        }
+        asked
     }
 
-    /// The same, for who looks at it by themselves.
+    /// The same, for who looks at it by themselves and tells [`Stop::note`].
     pub fn flag(&self) -> Arc<AtomicBool> {
-        Arc::clone(&self.0)
+        Arc::clone(&self.asked)
+    }
+
+    /// Says that the work has stopped early because of the flag.
+    pub fn note(&self) {
+        self.seen.store(true, Ordering::Relaxed);
     }
 }
 
@@ -65,7 +80,14 @@ pub enum Length {
 impl Workers {
     /// No threads yet.
     pub const fn new(package: &'static str) -> Workers {
-        Workers { package, pools: Mutex::new(Pools { process: 0, pools: Vec::new() }) }
+        let pools = Mutex::new(Pools { process: 0, pools: Vec::new() });
+        Workers { package, pools, stopped: AtomicUsize::new(0) }
+    }
+
+    /// Calls of this process whose work saw Ctrl-C before its end. The packages' tests tell by it
+    /// that a call did not go on to its end.
+    pub fn count_stopped(&self) -> usize {
+        self.stopped.load(Ordering::Relaxed)
     }
 
     /// A pool of `threads` threads; of as many as the machine has for 0.
@@ -113,9 +135,13 @@ impl Workers {
         let stop = Stop::default();
         let guarded = || catch_unwind(AssertUnwindSafe(|| pool.install(|| work(&stop))));
         let result = match length {
-            Length::Short => py.detach(guarded),
-            Length::Long => watched(py, &stop, guarded)?,
+            Length::Short => Ok(py.detach(guarded)),
+            Length::Long => watched(py, &stop, guarded),
         };
+        if stop.seen.load(Ordering::Relaxed) {
+            self.stopped.fetch_add(1, Ordering::Relaxed);
+        }
+        let result = result?;
         py.check_signals()?;
         result.map_err(|panic| {
             PyRuntimeError::new_err(format!(
@@ -143,7 +169,7 @@ fn watched<R: Send>(py: Python<'_>, stop: &Stop, work: impl FnOnce() -> R + Send
             if interrupted.is_none()
                 && let Err(error) = py.check_signals()
             {
-                stop.0.store(true, Ordering::Relaxed);
+                stop.asked.store(true, Ordering::Relaxed);
                 interrupted = Some(error);
             }
         }
