@@ -370,6 +370,15 @@ impl Mesh {
         self.hidden.get(cell).copied().unwrap_or(false)
     }
 
+    /// The mesh with all lengths times `factor`: from the unit of a file to metres.
+    #[must_use]
+    pub fn scaled(mut self, factor: f64) -> Mesh {
+        if factor != 1.0 {
+            self.points.iter_mut().for_each(|p| *p *= factor);
+        }
+        self
+    }
+
     /// Bounding box of all finite points.
     pub fn bounds(&self) -> (DVec3, DVec3) {
         let nothing = (DVec3::INFINITY, DVec3::NEG_INFINITY);

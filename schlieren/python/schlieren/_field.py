@@ -34,17 +34,18 @@ def _options(given):
     for name, check in checks.items():
         if given.get(name) is not None:
             flow[name] = check(name, given[name])
-    if not isinstance(given.get("revolve", False), (bool, np.bool_)):
-        raise TypeError(f"revolve is {given['revolve']!r}; give True or False")
-    if given.get("revolve"):
-        flow["revolve"] = True
+    for switch in ("revolve", "on_cells"):
+        if not isinstance(given.get(switch, False), (bool, np.bool_)):
+            raise TypeError(f"{switch} is {given[switch]!r}; give True or False")
+        if given.get(switch):
+            flow[switch] = True
     return flow
 
 
 #: Names of arguments that all ways to make a field have.
 OPTIONS = (
     "span", "revolve", "resample_nodes", "resample_samples", "reconstruction", "smoothing_nodes",
-    "outside", "hidden", "reference_n_minus_1", "model",
+    "outside", "hidden", "reference_n_minus_1", "model", "on_cells",
 )  # fmt: skip
 UNITS = ("density_unit", "temperature_unit", "pressure_unit", "length_unit")
 MEANING = (*QUANTITIES, *MEDIA, "species", "curves", "curve_rule")
@@ -301,6 +302,7 @@ class Field:
         `span`, `revolve` : the depth of a two-dimensional flow, or whether it is half of an
         axisymmetric one. `smoothing_nodes` : standard deviation of the smoothing of shocks.
         `resample_nodes`, `resample_samples`, `reconstruction` : how meshes become a lattice.
+        `on_cells` : whether light is traced through the cells of the mesh, without a lattice.
         `outside`, `hidden` : ``"blank"``, ``"solid"`` or ``"gas"``. `reference_n_minus_1` : of
         the medium around the field. `model` : ``"auto"``, ``"ciddor"`` or ``"gladstone-dale"``.
 

@@ -1,0 +1,168 @@
+//! One cell, prepared for lines: where they leave it, and over which face.
+
+use super::blend::{Corner, Polynomials};
+use super::border::{each_triangle, line_through, normal_and_middle};
+use super::faces::NO_FACE;
+use super::shares::Map;
+use super::{CellField, Kind};
+use glam::DVec3;
+
+/// Corners this far off the plane of a face, as a part of the cell's size, leave it plane, and those
+/// this far beyond it leave the cell convex. It is above the rounding of places in f32.
+const PLANE: f64 = 1e-6;
+/// A line passes a face whose point lies this far back, as a part of the cell's size: a bent ray is
+/// that much beside the place where its straight piece entered.
+const BACK: f64 = 1e-6;
+
+/// A cell with what lines need of it. Places are relative to its first corner.
+#[derive(Default)]
+pub(super) struct PreparedCell {
+    pub(super) origin: DVec3,
+    /// Diagonal of its box.
+    pub(super) size: f64,
+    pub(super) corners: Vec<DVec3>,
+    /// Middle of the corners.
+    pub(super) middle: DVec3,
+    pub(super) faces: Vec<Face>,
+    /// Corners of the faces, one face after the other.
+    pub(super) rings: Vec<u32>,
+    /// Whether lines leave through planes.
+    convex: bool,
+    pub(super) has_values: bool,
+    pub(super) map: Map,
+    pub(super) polynomials: Polynomials,
+}
+
+/// A face of the cell.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Face {
+    /// Outwards, of length one.
+    normal: DVec3,
+    /// Distance of its plane along the normal.
+    offset: f64,
+    /// Largest distance of a corner from the plane.
+    thickness: f64,
+    pub(super) middle: DVec3,
+    beyond: u32,
+    pub(super) first: u32,
+    pub(super) count: u32,
+    /// Whether the ring runs clockwise, seen from outside.
+    clockwise: bool,
+}
+
+impl PreparedCell {
+    /// Prepares a cell in place of another.
+    pub(super) fn prepare(&mut self, field: &CellField, cell: usize) {
+        let corners = field.mesh.corners(cell);
+        let place = |&i: &u32| field.mesh.point(i as usize);
+        self.origin = place(&corners.ids[0]);
+        self.corners.clear();
+        self.corners.extend(corners.ids.iter().map(|i| place(i) - self.origin));
+        let (low, high) = self
+            .corners
+            .iter()
+            .fold((DVec3::ZERO, DVec3::ZERO), |(l, h), p| (l.min(*p), h.max(*p)));
+        self.size = (high - low).length();
+        self.middle = self.corners.iter().sum::<DVec3>() / self.corners.len() as f64;
+        self.faces.clear();
+        self.rings.clear();
+        self.convex = true;
+        let beyond = field.neighbours.of_cell(cell);
+        let (mut number, mut ring_places) = (0, Vec::with_capacity(8));
+        corners.shape.each_face(|ring| {
+            ring_places.clear();
+            ring_places.extend(ring.iter().map(|&i| self.corners[i as usize]));
+            let first = self.rings.len() as u32;
+            self.rings.extend(ring);
+            if beyond[number] != NO_FACE {
+                let face = Face::new(&ring_places, self.middle, beyond[number], first);
+                let above = |p: &DVec3| face.normal.dot(*p) - face.offset;
+                let farthest = self.corners.iter().map(above).fold(0.0, f64::max);
+                self.convex &= face.thickness.max(farthest) <= PLANE * self.size;
+                self.faces.push(face);
+            }
+            number += 1;
+        });
+        self.has_values = field.kinds[cell] == Kind::Gas;
+        self.map.prepare(&self.corners, &corners.shape, self.size);
+        let corner = |(&id, &place): (&u32, &DVec3)| Corner {
+            place,
+            value: field.values[id as usize],
+            expansion: field.expansions.get(id as usize),
+        };
+        self.polynomials.prepare(corners.ids.iter().zip(&self.corners).map(corner));
+    }
+
+    /// The distance from `at` along `direction` to where a line leaves the cell, and what lies
+    /// beyond. `None` when it passes no face outwards: rounding at an edge, or a cell that folds.
+    pub(super) fn way_out(&self, at: DVec3, direction: DVec3) -> Option<(f64, u32)> {
+        let at = at - self.origin;
+        let mut best: Option<(f64, u32)> = None;
+        if self.convex {
+            for f in &self.faces {
+                let speed = f.normal.dot(direction);
+                if speed > 0.0 {
+                    let distance = (f.offset - f.normal.dot(at)) / speed;
+                    if best.is_none_or(|b| distance < b.0) {
+                        best = Some((distance, f.beyond));
+                    }
+                }
+            }
+        } else {
+            let back = -BACK * self.size;
+            for f in &self.faces {
+                if f.may_be_before(at, direction, back, best.map_or(f64::INFINITY, |b| b.0)) {
+                    self.through_triangles(f, at, direction, back, &mut best);
+                }
+            }
+        }
+        best.map(|(distance, beyond)| (distance.max(0.0), beyond))
+    }
+
+    fn through_triangles(
+        &self,
+        face: &Face,
+        at: DVec3,
+        direction: DVec3,
+        back: f64,
+        best: &mut Option<(f64, u32)>,
+    ) {
+        let ring = &self.rings[face.first as usize..(face.first + face.count) as usize];
+        let place = |i: usize| self.corners[ring[i] as usize] - at;
+        each_triangle(ring.len(), face.middle - at, place, |triangle| {
+            if let Some((distance, along)) = line_through(triangle, direction)
+                && along != face.clockwise
+                && distance >= back
+                && best.is_none_or(|b| distance < b.0)
+            {
+                *best = Some((distance, face.beyond));
+            }
+        });
+    }
+}
+
+impl Face {
+    fn new(ring: &[DVec3], inside: DVec3, beyond: u32, first: u32) -> Face {
+        let (normal, middle) = normal_and_middle(ring);
+        let clockwise = normal.dot(middle - inside) < 0.0;
+        let normal = normal.normalize_or_zero() * if clockwise { -1.0 } else { 1.0 };
+        let offset = normal.dot(middle);
+        let off = |p: &DVec3| (normal.dot(*p) - offset).abs();
+        let thickness = ring.iter().map(off).fold(0.0, f64::max);
+        let count = ring.len() as u32;
+        Face { normal, offset, thickness, middle, beyond, first, count, clockwise }
+    }
+
+    /// Whether a line may pass the face between two distances: it is between the planes that the
+    /// face lies between.
+    fn may_be_before(&self, at: DVec3, direction: DVec3, from: f64, to: f64) -> bool {
+        let (height, speed) = (self.normal.dot(at) - self.offset, self.normal.dot(direction));
+        let half = self.thickness * (1.0 + 1e-9) + f64::EPSILON * at.abs().max_element();
+        if speed.abs() < 1e-12 {
+            return height.abs() <= half + 1e-9 * self.thickness.max(at.length());
+        }
+        let ends = [(-half - height) / speed, (half - height) / speed];
+        let margin = 1e-9 * (ends[0].abs().max(ends[1].abs()));
+        ends[0].max(ends[1]) + margin >= from && ends[0].min(ends[1]) - margin <= to
+    }
+}
