@@ -1,14 +1,14 @@
 //! Describes the gas by the cells of a mesh, for marches that need no lattice.
 
-use crate::input::Role;
+use crate::field::Node;
 use datasets::resample::CellField;
 use glam::DVec3;
 use std::sync::Arc;
 
 /// The gas in the cells of a mesh, in metres: eps = n/n0 - 1 and its gradient at any place.
 ///
-/// The field of light is the mesh's box. What a ray meets in it beside the cells is as its role
-/// says: solid and blank places stop it, and through gas it goes on straight, as through the
+/// The field of light is the mesh's box. Solid and blank places in it beside the cells, and cells
+/// that the solver hides, stop a ray. Through gas there it goes on straight, as through the
 /// reference medium.
 #[derive(Clone)]
 pub struct GasOnCells {
@@ -16,20 +16,21 @@ pub struct GasOnCells {
     /// The value of the reference medium, in the unit of the cells' values.
     reference: f64,
     n0: f64,
-    pub(crate) outside: Role,
-    pub(crate) hidden: Role,
+    pub(crate) outside: Node,
+    pub(crate) hidden: Node,
     at_rest: bool,
 }
 
 impl GasOnCells {
-    /// The gas of a field of n − 1 in metres; a constant may be subtracted from it. `reference` is
-    /// the value of the medium of index `n0` around it.
+    /// The gas of a field of n − 1 in metres; a constant may be subtracted from it. `reference`
+    /// is the value of the medium of index `n0` around it. `outside` and `hidden` are what is in
+    /// the mesh's box beside the cells, and what hidden cells are.
     pub fn new(
         cells: CellField,
         reference: f64,
         n0: f64,
-        outside: Role,
-        hidden: Role,
+        outside: Node,
+        hidden: Node,
     ) -> GasOnCells {
         GasOnCells { cells: Arc::new(cells), reference, n0, outside, hidden, at_rest: false }
     }

@@ -2,6 +2,7 @@
 
 mod bells;
 mod common;
+mod program;
 
 use bells::{BLOB, cell_averages, hexahedra, options, stretched, tetrahedra};
 use common::{grid, oblique};
@@ -120,8 +121,10 @@ fn cube(n: usize, moved: impl Fn(DVec3) -> DVec3, eps: impl Fn(DVec3) -> f64) ->
         *p = moved(DVec3::from(*p)).to_array();
     }
     let values = points.iter().map(|p| eps(DVec3::from(*p))).collect();
-    grid.attributes =
-        Attributes { point: vec![DataArray::new("eps", 1, Values::F64(values))], ..Default::default() };
+    grid.attributes = Attributes {
+        point: vec![DataArray::new("eps", 1, Values::F64(values))],
+        ..Default::default()
+    };
     grid
 }
 
@@ -206,8 +209,8 @@ fn with_hole() -> Dataset {
 
 #[test]
 fn a_hole_is_what_its_role_says_and_rays_enter_again_behind_it() {
-    let starts = [-0.31, -0.1, 0.0, 0.17, 0.33]
-        .map(|x| Start { position_m: [x, 0.05], tilt_rad: [0.0; 2] });
+    let starts =
+        [-0.31, -0.1, 0.0, 0.17, 0.33].map(|x| Start { position_m: [x, 0.05], tilt_rad: [0.0; 2] });
     let through = [false, true, true, true, false];
     for (role, status) in
         [(Role::Blank, Status::Masked), (Role::Solid, Status::Blocked), (Role::Gas, Status::Free)]
@@ -295,4 +298,58 @@ fn the_bell_of_the_meshes_is_the_one_of_the_closed_form() {
     let Dataset::UnstructuredGrid(grid) = hexahedra(5) else { panic!("hexahedra") };
     let eps = &grid.attributes.point[0];
     assert_eq!(eps.get(62, 0), BLOB.sample(DVec3::ZERO).0);
+}
+
+#[test]
+fn the_program_traces_on_cells_and_says_what_it_did() {
+    use program::{schlieren, text};
+    let folder = tempfile::tempdir().unwrap();
+    let [file, png] = ["mesh.vtu", "image.png"].map(|n| folder.path().join(n));
+    let options = datasets::write::VtkOptions::default();
+    datasets::write::write_vtk(&file, &tetrahedra(9), options).unwrap();
+    let [file, png] = [&file, &png].map(|p| p.to_str().unwrap());
+    let render = ["render", file, "--n-minus-1", "eps", "--size", "32x32", "--on-cells"];
+    let run = |more: &[&str]| schlieren(&[&render[..], more].concat());
+
+    let output = run(&["-o", png, "--json"]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(json["grid"].is_null(), "{json}");
+    let cells = &json["cells"];
+    assert_eq!((&cells["cells"], &cells["left_out"]), (&3072.into(), &0.into()), "{cells}");
+    assert_eq!(cells["work"]["moved_on"], 0, "{cells}");
+    let crossed = cells["work"]["cells_crossed"].as_u64().unwrap();
+    assert!(crossed > 5 * cells["work"]["rays"].as_u64().unwrap(), "{cells}");
+    assert!(json["march"].as_str().unwrap().contains("cells"), "{json}");
+
+    for more in
+        [&["--resample", "64"][..], &["--smoothing", "1"], &["--revolve"], &["--device", "gpu"]]
+    {
+        let output = run(&[more, &["-o", png]].concat());
+        let message = text(&output.stderr);
+        assert!(!output.status.success(), "{more:?}: {message}");
+        assert!(message.contains(more[0]) && message.contains("--on-cells"), "{message}");
+    }
+    let scene = text(&run(&["--print-scene"]).stdout);
+    assert!(scene.contains("on_cells = true"), "{scene}");
+    let info = text(&schlieren(&["info", file]).stdout);
+    assert!(info.contains("--on-cells traces it through the 3072 cells"), "{info}");
+}
+
+#[test]
+fn bos_and_its_background_are_made_on_cells() {
+    let data = hexahedra(9);
+    let text = "[flow]\nfile = \"\"\nn_minus_1 = \"eps\"\non_cells = true\n[film]\n\
+                size = [24, 24]\n[technique]\nkind = \"bos\"\n";
+    let scene = Scene::from_toml(text).unwrap();
+    let mut section = TestSection::of_dataset(&scene, &data, None).unwrap();
+    let picture = |section: &TestSection| {
+        render(&scene, section, Layers { map: true, ..Layers::NONE }, &Control::default()).unwrap()
+    };
+    let with = picture(&section).map.unwrap();
+    let (_, cells) = section.take_flow().unwrap();
+    let without = picture(&section).map.unwrap();
+    assert!(with.largest_deflection_rad > 1e-5 && without.largest_deflection_rad == 0.0);
+    section.cells = cells;
+    assert_eq!(picture(&section).map.unwrap(), with);
 }

@@ -77,7 +77,7 @@ pub fn cells_from_dataset(
     report.reference_n_minus_1 = background + d0;
     warn_outside(&cells, options, &mut report);
     let n0 = 1.0 + background + d0;
-    Ok((GasOnCells::new(cells, d0, n0, options.outside, options.hidden), report))
+    Ok((GasOnCells::new(cells, d0, n0, options.outside.node(), options.hidden.node()), report))
 }
 
 fn warn_outside(cells: &CellField, options: &Options, report: &mut Report) {

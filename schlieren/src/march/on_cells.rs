@@ -6,14 +6,13 @@
 //! way on the other.
 //!
 //! Where a cell ends at the border of the mesh, the ray goes on straight to the cell that it enters
-//! next. A stretch between is that of a hole, a body, or a gap between blocks. Gaps are shorter than
-//! a thousandth of a cell and change nothing; others are as [`GasOnCells`] says.
+//! next. A stretch between is that of a hole, a body, or a gap between blocks. Gaps are shorter
+//! than a thousandth of a cell and change nothing; others are as [`GasOnCells`] says.
 
 use super::frame::{BlankCells, clip};
 use super::integrator::Ray;
 use crate::field::Node;
 use crate::gas_on_cells::GasOnCells;
-use crate::input::Role;
 use crate::path::{Exit, LightPaths, PathQuantities, Start, Status};
 use crate::view::View;
 use datasets::resample::{Beyond, CellWalker};
@@ -48,8 +47,8 @@ pub struct CellCounters {
     pub samples: u64,
     /// Gaps between blocks that were crossed.
     pub gaps: u64,
-    /// Rays at an edge without a way out by rounding, which were moved on by a hundred-thousandth of
-    /// a cell.
+    /// Rays at an edge without a way out by rounding, which were moved on by a hundred-thousandth
+    /// of a cell.
     pub moved_on: u64,
 }
 
@@ -181,7 +180,8 @@ impl<'a> OnCells<'a> {
                 ..Exit::UNDISTURBED
             };
         }
-        let opd = if self.quantities.opd { self.gas.n0() * r.path_difference_m() } else { f64::NAN };
+        let opd =
+            if self.quantities.opd { self.gas.n0() * r.path_difference_m() } else { f64::NAN };
         Exit {
             deflection_rad: [r.u.dot(right) as f32, r.u.dot(up) as f32],
             displacement_m: [r.xi_m.dot(right) as f32, r.xi_m.dot(up) as f32],
@@ -237,7 +237,7 @@ impl Piecewise<'_, '_> {
         let mut gap_m = GAP * self.paths.typical_cell_m;
         let most_m = MOST_DIAGONALS * self.paths.size_m.length();
         let mut stuck = 0;
-        let mut inside: Option<u32> = None;
+        let (mut from, mut inside) = (Beyond::Outside, Beyond::Outside);
         for _ in 0..MOST_PIECES {
             let w = self.ray.w();
             let speed = w.length();
@@ -246,31 +246,31 @@ impl Piecewise<'_, '_> {
             if !(self.ray.tau_m <= most_m && at_m.is_finite()) {
                 break;
             }
-            let Some(cell) = inside else {
+            let Beyond::Cell(cell) = inside else {
                 match self.next_cell(direction, speed, before, slack_m, gap_m) {
-                    Ok(cell) => inside = Some(cell),
+                    Ok(cell) => (from, inside) = (inside, Beyond::Cell(cell)),
                     Err(end) => return end,
                 }
                 continue;
             };
             let size_m = self.walker.size(cell);
             (slack_m, gap_m) = (SLACK * size_m, GAP * size_m);
-            let way = self.walker.leave(cell, at_m, direction).filter(|_| stuck < STUCK);
+            let way = self.walker.leave(cell, at_m, direction, from).filter(|_| stuck < STUCK);
             let Some((length_m, beyond)) = way else {
                 self.counters.moved_on += 1;
                 self.ray.drift(MOVED_ON * size_m / speed);
-                (stuck, inside, before) = (0, None, gas.outside);
+                (stuck, inside, before) = (0, Beyond::Outside, gas.outside);
                 continue;
             };
             stuck = if length_m <= NO_PROGRESS * size_m { stuck + 1 } else { 0 };
             if length_m > 0.0 && !self.cross(cell, length_m / speed) {
                 return End::Stopped(Node::Blank);
             }
-            (inside, before) = match beyond {
-                Beyond::Cell(next) => (Some(next), before),
-                Beyond::Outside => (None, gas.outside),
-                Beyond::Hidden => (None, gas.hidden),
+            before = match beyond {
+                Beyond::Hidden => gas.hidden,
+                Beyond::Cell(_) | Beyond::Outside => gas.outside,
             };
+            (from, inside) = (inside, beyond);
         }
         End::Trapped
     }
@@ -300,7 +300,7 @@ impl Piecewise<'_, '_> {
         &mut self,
         direction: DVec3,
         speed: f64,
-        before: Role,
+        before: Node,
         slack_m: f64,
         gap_m: f64,
     ) -> Result<u32, End> {
@@ -315,8 +315,8 @@ impl Piecewise<'_, '_> {
             _ => gas.outside,
         };
         if stretch_m > gap_m {
-            for (role, node) in [(Role::Solid, Node::Solid), (Role::Blank, Node::Blank)] {
-                if before == role || after == role {
+            for node in [Node::Solid, Node::Blank] {
+                if before == node || after == node {
                     return Err(End::Stopped(node));
                 }
             }

@@ -1,4 +1,5 @@
-//! Plans light paths through the cells of a mesh: as few steps in each cell as the tolerance allows.
+//! Plans light paths through the cells of a mesh: as few steps in each cell as the tolerance
+//! allows.
 
 use super::planned::PlannedPaths;
 use crate::gas_on_cells::GasOnCells;
@@ -13,8 +14,8 @@ const STEPS: [u32; 3] = [1, 2, 4];
 /// Steps of the rays that measure the error, by those of the plan.
 const FINER: u32 = 4;
 
-/// Paths whose error, measured with `measured_rays` rays in finer steps, is within the tolerance, if
-/// four steps in each cell reach it. Without measuring, there is one step.
+/// Paths whose error, measured with `measured_rays` rays in finer steps, is within the tolerance,
+/// if four steps in each cell reach it. Without measuring, there is one step.
 pub(super) fn planned(
     gas: &GasOnCells,
     view: View,
@@ -42,13 +43,8 @@ pub(super) fn planned(
     }
     let per_cell = if steps == 1 { "one step".into() } else { format!("{steps} steps") };
     let (work, description) = (paths.work(), format!("verlet on cells, {per_cell} in each"));
-    let mut planned = PlannedPaths::new(
-        Box::new(paths),
-        description,
-        None,
-        tolerance_rad,
-        (Bend::Full, 1.0),
-    );
+    let mut planned =
+        PlannedPaths::new(Box::new(paths), description, None, tolerance_rad, (Bend::Full, 1.0));
     if let Some(error) = error_rad.filter(|e| *e > tolerance_rad) {
         planned.warnings.push(format!(
             "deflections are off by up to {error:.1e} rad, above the tolerance of \

@@ -39,7 +39,10 @@ impl Scene {
             (
                 "technique.kind",
                 "--technique",
-                matches!(self.technique, TechniqueSpec::Volume { .. } | TechniqueSpec::Slice { .. }),
+                matches!(
+                    self.technique,
+                    TechniqueSpec::Volume { .. } | TechniqueSpec::Slice { .. }
+                ),
                 self.technique.name().into(),
                 "reads a lattice",
             ),

@@ -162,15 +162,13 @@ impl Group {
             let third = (1.0 / 3.0) * (x * kx + y * ky + z * kz);
             let change = self.constant[l] + ((third + second) + first);
             // Beyond its bounds a polynomial is constant.
-            let free =
-                if change > self.low[l] && change < self.high[l] { share.n[l] } else { 0.0 };
+            let free = if change > self.low[l] && change < self.high[l] { share.n[l] } else { 0.0 };
             let change = change.max(self.low[l]).min(self.high[l]);
-            let (gx, gy, gz) =
-                (c[0][l] + hx + kx, c[1][l] + hy + ky, c[2][l] + hz + kz);
+            let (gx, gy, gz) = (c[0][l] + hx + kx, c[1][l] + hy + ky, c[2][l] + hz + kz);
             let value = self.value[l] + change;
             out[0][l] = share.n[l] * value;
-            out[1][l] = share.gradient[0][l] * value
-                + free * (f[0][l] * gx + f[1][l] * gy + f[3][l] * gz);
+            out[1][l] =
+                share.gradient[0][l] * value + free * (f[0][l] * gx + f[1][l] * gy + f[3][l] * gz);
             out[2][l] = share.gradient[1][l] * value + free * (f[2][l] * gy + f[4][l] * gz);
             out[3][l] = share.gradient[2][l] * value + free * (f[5][l] * gz);
         }

@@ -121,7 +121,8 @@ impl Border {
                 } else {
                     1 + usize::from(size.z > size.y)
                 };
-                let key = |face: &u32| boxes[*face as usize].0[axis] + boxes[*face as usize].1[axis];
+                let key =
+                    |face: &u32| boxes[*face as usize].0[axis] + boxes[*face as usize].1[axis];
                 faces.select_nth_unstable_by(count / 2, |a, b| {
                     key(a).total_cmp(&key(b)).then(a.cmp(b))
                 });
@@ -205,7 +206,10 @@ impl Border {
             let Some((distance, along)) = line_through(triangle, direction) else { return };
             let inwards = along == f.clockwise;
             let from = if inwards { -slack } else { slack };
-            if distance.is_nan() || distance < from || distance > most || !inwards && distance == from
+            if distance.is_nan()
+                || distance < from
+                || distance > most
+                || !inwards && distance == from
             {
                 return;
             }
@@ -258,7 +262,8 @@ pub(super) fn each_triangle(
 }
 
 /// The distance at which a line from the origin passes a triangle, its edges included, and whether
-/// it does so along the normal of its corners' order. `None` when it misses it or runs in its plane.
+/// it does so along the normal of its corners' order. `None` when it misses it or runs in its
+/// plane.
 ///
 /// Signed volumes with the edges, as with Plücker coordinates: two triangles with a common edge
 /// compute the same number for it with opposite signs, so that no line passes between them.

@@ -7,12 +7,14 @@ use super::shares::Map;
 use super::{CellField, Kind};
 use glam::DVec3;
 
-/// Corners this far off the plane of a face, as a part of the cell's size, leave it plane, and those
-/// this far beyond it leave the cell convex. It is above the rounding of places in f32.
+/// Corners this far off the plane of a face, as a part of the cell's size, leave it plane, and
+/// those this far beyond it leave the cell convex. It is above the rounding of places in f32.
 const PLANE: f64 = 1e-6;
-/// A line passes a face whose point lies this far back, as a part of the cell's size: a bent ray is
-/// that much beside the place where its straight piece entered.
+/// A line whose faces all lie behind leaves through one that is this far back at most, as a part of
+/// the cell's size: a bent ray is that much beside the place where its straight piece entered.
 const BACK: f64 = 1e-6;
+/// Faces this near, as a part of the cell's size, are passed at once.
+const AT_ONCE: f64 = 1e-11;
 
 /// A cell with what lines need of it. Places are relative to its first corner.
 #[derive(Default)]
@@ -48,6 +50,14 @@ pub(super) struct Face {
     pub(super) count: u32,
     /// Whether the ring runs clockwise, seen from outside.
     clockwise: bool,
+}
+
+/// Ways out of a cell: distance, and what lies beyond.
+#[derive(Default)]
+struct Ways {
+    ahead: Option<(f64, u32)>,
+    behind: Option<(f64, u32)>,
+    returning: Option<(f64, u32)>,
 }
 
 impl PreparedCell {
@@ -95,10 +105,13 @@ impl PreparedCell {
 
     /// The distance from `at` along `direction` to where a line leaves the cell, and what lies
     /// beyond. `None` when it passes no face outwards: rounding at an edge, or a cell that folds.
-    pub(super) fn way_out(&self, at: DVec3, direction: DVec3) -> Option<(f64, u32)> {
+    ///
+    /// A line that runs along the ridge of a bent face passes it there and back at one place. It
+    /// came `from` there, and does not go back at once.
+    pub(super) fn way_out(&self, at: DVec3, direction: DVec3, from: u32) -> Option<(f64, u32)> {
         let at = at - self.origin;
-        let mut best: Option<(f64, u32)> = None;
         if self.convex {
+            let mut best: Option<(f64, u32)> = None;
             for f in &self.faces {
                 let speed = f.normal.dot(direction);
                 if speed > 0.0 {
@@ -108,34 +121,47 @@ impl PreparedCell {
                     }
                 }
             }
-        } else {
-            let back = -BACK * self.size;
-            for f in &self.faces {
-                if f.may_be_before(at, direction, back, best.map_or(f64::INFINITY, |b| b.0)) {
-                    self.through_triangles(f, at, direction, back, &mut best);
-                }
+            return best.map(|(distance, beyond)| (distance.max(0.0), beyond));
+        }
+        let (back, at_once) = (-BACK * self.size, AT_ONCE * self.size);
+        let mut ways = Ways::default();
+        for f in &self.faces {
+            let nearest = ways.ahead.map_or(f64::INFINITY, |w| w.0);
+            if f.may_be_before(at, direction, back, nearest) {
+                self.through_triangles(f, at, direction, |distance| {
+                    let way = Some((distance, f.beyond));
+                    if distance < -at_once {
+                        let nearer = ways.behind.is_none_or(|w| distance > w.0);
+                        if distance >= back && nearer {
+                            ways.behind = way;
+                        }
+                    } else if distance <= at_once && f.beyond == from {
+                        ways.returning = way;
+                    } else if ways.ahead.is_none_or(|w| distance < w.0) {
+                        ways.ahead = way;
+                    }
+                });
             }
         }
-        best.map(|(distance, beyond)| (distance.max(0.0), beyond))
+        let way = ways.ahead.or(ways.behind).or(ways.returning);
+        way.map(|(distance, beyond)| (distance.max(0.0), beyond))
     }
 
+    /// Calls `passed` with the distances at which a line passes a face outwards.
     fn through_triangles(
         &self,
         face: &Face,
         at: DVec3,
         direction: DVec3,
-        back: f64,
-        best: &mut Option<(f64, u32)>,
+        mut passed: impl FnMut(f64),
     ) {
         let ring = &self.rings[face.first as usize..(face.first + face.count) as usize];
         let place = |i: usize| self.corners[ring[i] as usize] - at;
         each_triangle(ring.len(), face.middle - at, place, |triangle| {
             if let Some((distance, along)) = line_through(triangle, direction)
                 && along != face.clockwise
-                && distance >= back
-                && best.is_none_or(|b| distance < b.0)
             {
-                *best = Some((distance, face.beyond));
+                passed(distance);
             }
         });
     }

@@ -6,16 +6,18 @@
 //!   └── prepared cell: planes, shares, polynomials ┴── walker: enter, sample, leave
 //! ```
 //! The value at a place is that of [`Reconstruction`]: the mean of the polynomials of the cell's
-//! corners, weighted by the shape functions of the element, f = Σ Nᵢ pᵢ. Its gradient is the exact
-//! one of this blend, Σ (Nᵢ ∇pᵢ + pᵢ ∇Nᵢ): an integral of the gradient along neighbouring lines is
-//! the change of the integral of the value between them. The value is continuous across faces. The
-//! gradient jumps there by the polynomials' differences by the size of the cell: by its third power
-//! where the field is smooth.
+//! corners, weighted by the shape functions of the element, f = Σ Nᵢ pᵢ. Its gradient is the
+//! exact one of this blend, Σ (Nᵢ ∇pᵢ + pᵢ ∇Nᵢ): an integral of the gradient along
+//! neighbouring lines is the change of the integral of the value between them. The value is
+//! continuous across faces. The gradient jumps there by the polynomials' differences by the size of
+//! the cell: by its third power where the field is smooth. (The faces of the shape functions of
+//! hexahedra are bent smoothly, and lines leave bent faces through triangles. Between the two, the
+//! value differs by the jump of the gradient times their distance.)
 //!
-//! A line goes from cell to cell over their faces ([`CellWalker`]). Cells of all types have the same
-//! faces: polygons, which are fans of triangles around their middles unless they are plane, so that
-//! neighbours of different types leave no gap. Where the faces of two blocks do not match, the line
-//! leaves one at its border and enters the other at its own.
+//! A line goes from cell to cell over their faces ([`CellWalker`]). Cells of all types have the
+//! same faces: polygons, which are fans of triangles around their middles unless they are plane, so
+//! that neighbours of different types leave no gap. Where the faces of two blocks do not match, the
+//! line leaves one at its border and enters the other at its own.
 
 mod blend;
 mod border;
@@ -37,8 +39,8 @@ use faces::Neighbours;
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// A cell with less volume than this part of the cube of its box's diagonal has none. Cells at walls
-/// are 1e5 times as wide as high.
+/// A cell with less volume than this part of the cube of its box's diagonal has none. Cells at
+/// walls are 1e5 times as wide as high.
 const LEAST_VOLUME: f64 = 1e-15;
 
 /// What a cell holds.
@@ -71,16 +73,14 @@ enum Kind {
 /// let (mut walker, mut sum) = (field.walker(), 0.0);
 /// let start = DVec3::new(-1.0, 0.3, 0.6);
 /// let entry = walker.enter(start, DVec3::X, 10.0, 0.0).expect("the line meets the mesh");
-/// let (mut at, mut cell) = (start + DVec3::X * entry.distance, Some(entry.cell));
-/// while let Some(inside) = cell {
-///     let (length, beyond) = walker.leave(inside, at, DVec3::X).expect("a way out");
-///     let (_, gradient) = walker.sample(inside, at + DVec3::X * (0.5 * length));
+/// let (mut at, mut from) = (start + DVec3::X * entry.distance, Beyond::Outside);
+/// let mut place = Beyond::Cell(entry.cell);
+/// while let Beyond::Cell(cell) = place {
+///     let (length, beyond) = walker.leave(cell, at, DVec3::X, from).expect("a way out");
+///     let (_, gradient) = walker.sample(cell, at + DVec3::X * (0.5 * length));
 ///     sum += gradient.x * length;
 ///     at += DVec3::X * length;
-///     cell = match beyond {
-///         Beyond::Cell(next) => Some(next),
-///         Beyond::Outside | Beyond::Hidden => None,
-///     };
+///     (from, place) = (place, beyond);
 /// }
 /// assert!((sum - 1.0).abs() < 1e-6 && (at.x - 1.0).abs() < 1e-12);
 /// # Ok::<(), datasets::resample::ResampleError>(())
@@ -130,8 +130,8 @@ impl CellReport {
         let all = [
             (
                 self.left_out,
-                "cells left out: not solid, without volume, or with points that do not exist or are \
-                 not finite",
+                "cells left out: not solid, without volume, or with points that do not exist or \
+                 are not finite",
             ),
             (self.straightened, "higher-order cells taken with straight edges"),
             (self.folded, "cells fold or collapse and have the shape functions of tetrahedra"),
@@ -311,8 +311,8 @@ fn weighted_median(mut pairs: Vec<(f64, f64)>) -> Option<f64> {
     middle.or(pairs.last()).map(|p| p.0)
 }
 
-/// Whether a cell has volume, by the tetrahedra between its middle, the middles of its faces and its
-/// edges, and whether it folds.
+/// Whether a cell has volume, by the tetrahedra between its middle, the middles of its faces and
+/// its edges, and whether it folds.
 fn shape_of(mesh: &Mesh, corners: &Corners) -> Shape {
     let points: Vec<DVec3> = corners.ids.iter().map(|&i| mesh.point(i as usize)).collect();
     let left_out = Shape { kind: Kind::LeftOut, folded: false, volume: 0.0 };

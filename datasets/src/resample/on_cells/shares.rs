@@ -1,22 +1,22 @@
 //! The shares of a cell's corners at a place, and their gradients.
 //!
-//! For x(q) = Σ Nᵢ(q) xᵢ the gradient in space is ∇Nᵢ = J⁻ᵀ ∂Nᵢ/∂q with the Jacobian J = ∂x/∂q of
-//! the map, which Newton's method has at the end. Of cells without a map of their own, as polyhedra,
-//! shares are linear in the tetrahedra of `shape::Cell`, and so are their gradients.
+//! For x(q) = Σ Nᵢ(q) xᵢ the gradient in space is ∇Nᵢ = J⁻ᵀ ∂Nᵢ/∂q with the
+//! Jacobian J = ∂x/∂q of the map, which Newton's method has at the end. Of cells without a map
+//! of their own, as polyhedra, shares are linear in the tetrahedra of `shape::Cell`, and so are
+//! their gradients.
 
 use super::blend::{LANES, Share, set};
-use super::cell::PreparedCell;
 use crate::resample::mesh::Shape;
 use crate::resample::shape::{Cell, basis};
 use glam::{DMat3, DVec3};
 
-/// Newton has converged when the step, in units of the cell, is this small: the next one would be of
-/// the order of its square.
+/// Newton has converged when the step, in units of the cell, is this small: the next one would be
+/// of the order of its square.
 const CONVERGED: f64 = 1e-7;
 /// Steps, at most. The first guess is that of the linear map at the middle.
 const MAX_STEPS: usize = 16;
-/// A cell whose corners are this near those of a parallelepiped, as a part of its size, has a linear
-/// map.
+/// A cell whose corners are this near those of a parallelepiped, as a part of its size, has a
+/// linear map.
 const AFFINE: f64 = 1e-12;
 
 /// How parameters follow from a place.
@@ -63,9 +63,7 @@ impl Map {
         let [a, b, c] = edges;
         let affine = match shape {
             Shape::Tetra => true,
-            Shape::Hexa => {
-                off(2, a + b) && off(5, a + c) && off(6, a + b + c) && off(7, b + c)
-            }
+            Shape::Hexa => off(2, a + b) && off(5, a + c) && off(6, a + b + c) && off(7, b + c),
             Shape::Wedge => off(4, a + c) && off(5, b + c),
             _ => false,
         };
@@ -99,16 +97,15 @@ fn place_and_jacobian(corners: &[DVec3], shape: &Shape, q: DVec3) -> (DVec3, DMa
     (x, j)
 }
 
-/// The shares of the corners at `at`, relative to the cell's origin. False when there are none: all
-/// its tetrahedra are flat.
-pub(super) fn shares(cell: &PreparedCell, at: DVec3, out: &mut Vec<Share>) -> bool {
-    let groups = cell.corners.len().div_ceil(LANES);
+/// The shares of the corners at `at`; both are relative to the cell's origin. False when there are
+/// none: all its tetrahedra are flat.
+pub(super) fn shares(corners: &[DVec3], map: &Map, at: DVec3, out: &mut Vec<Share>) -> bool {
+    let groups = corners.len().div_ceil(LANES);
     out.clear();
     out.resize(groups, Share::NONE);
-    let map = &cell.map;
     let Some(shape) = &map.shape else { return false };
     if map.kind == MapKind::Fan {
-        return by_tetrahedra(cell, shape, at, out);
+        return by_tetrahedra(corners, shape, at, out);
     }
     let mut q = map.middle + map.inverse * (at - map.at_middle);
     let mut inverse = map.inverse;
@@ -117,7 +114,7 @@ pub(super) fn shares(cell: &PreparedCell, at: DVec3, out: &mut Vec<Share>) -> bo
         q = within(q);
         let mut converged = false;
         for _ in 0..MAX_STEPS {
-            let (x, jacobian) = place_and_jacobian(&cell.corners, shape, q);
+            let (x, jacobian) = place_and_jacobian(corners, shape, q);
             inverse = jacobian.inverse();
             let next = within(q + inverse * (at - x));
             let moved = (next - q).abs().max_element();
@@ -132,7 +129,7 @@ pub(super) fn shares(cell: &PreparedCell, at: DVec3, out: &mut Vec<Share>) -> bo
             }
         }
         if !converged {
-            return by_tetrahedra(cell, shape, at, out);
+            return by_tetrahedra(corners, shape, at, out);
         }
     }
     let to_space = inverse.transpose();
@@ -145,17 +142,16 @@ pub(super) fn shares(cell: &PreparedCell, at: DVec3, out: &mut Vec<Share>) -> bo
         return true;
     }
     let (n, d) = basis(shape, q);
-    for i in 0..cell.corners.len() {
+    for i in 0..corners.len() {
         set(out, i, n[i], to_space * d[i]);
     }
     true
 }
 
-/// The shares in that tetrahedron, between the cell's middle, a face's middle and an edge, which the
-/// place is in or nearest to.
-fn by_tetrahedra(cell: &PreparedCell, shape: &Shape, at: DVec3, out: &mut [Share]) -> bool {
-    let centre = cell.middle;
-    let corners = &cell.corners;
+/// The shares in that tetrahedron, between the cell's middle, a face's middle and an edge, which
+/// the place is in or nearest to.
+fn by_tetrahedra(corners: &[DVec3], shape: &Shape, at: DVec3, out: &mut [Share]) -> bool {
+    let centre = corners.iter().sum::<DVec3>() / corners.len() as f64;
     // How far outside, the shares of the face's middle and the edge, their gradients, the edge.
     let mut best: Option<(f64, DVec3, DMat3, [u32; 2])> = None;
     let mut best_face: Vec<u32> = Vec::new();

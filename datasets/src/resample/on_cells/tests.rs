@@ -80,9 +80,8 @@ fn grid(n: usize, share: f64, split: Split) -> UnstructuredGrid {
             }
             Split::Tetrahedra => {
                 for order in [[1, 2, 4], [2, 1, 4], [1, 4, 2], [4, 1, 2], [2, 4, 1], [4, 2, 1]] {
-                    let corner = |bits: usize| {
-                        id(i + (bits & 1), j + (bits >> 1 & 1), k + (bits >> 2 & 1))
-                    };
+                    let corner =
+                        |bits: usize| id(i + (bits & 1), j + (bits >> 1 & 1), k + (bits >> 2 & 1));
                     cells.push([0, order[0], order[0] + order[1], 7].map(corner));
                     g.types.push(10);
                 }
@@ -119,6 +118,8 @@ fn field_of(data: &Dataset, f: impl Fn(DVec3) -> f64, how: Reconstruction) -> Ce
 struct Crossing {
     cells: Vec<(u32, f64)>,
     gaps: usize,
+    /// How often it went round in circles.
+    moved_on: usize,
     gradient: DVec3,
     end: f64,
 }
@@ -126,14 +127,18 @@ struct Crossing {
 /// Two points of Gauss in each cell: exact for gradients of cubic fields.
 fn cross(walker: &mut CellWalker<'_>, start: DVec3, direction: DVec3) -> Crossing {
     let mut out = Crossing::default();
-    let (mut at, mut slack) = (0.0, 0.0);
+    let (mut at, mut slack, mut stuck) = (0.0, 0.0, 0);
     while let Some(entry) = walker.enter(start + direction * at, direction, f64::INFINITY, slack) {
         out.gaps += usize::from(entry.distance > 1e-9 && !out.cells.is_empty());
         at += entry.distance;
-        let mut inside = Some(entry.cell);
-        while let Some(cell) = inside {
+        let (mut from, mut inside) = (Beyond::Outside, Beyond::Cell(entry.cell));
+        while let Beyond::Cell(cell) = inside {
             let place = start + direction * at;
-            let (length, beyond) = walker.leave(cell, place, direction).expect("a way out");
+            let Some((length, beyond)) = walker.leave(cell, place, direction, from) else {
+                out.moved_on += 1;
+                at += 1e-5 * walker.size(cell);
+                break;
+            };
             for share in [0.211_324_865_405_187_1, 0.788_675_134_594_812_9] {
                 let (_, g) = walker.sample(cell, place + direction * (share * length));
                 out.gradient += g * (0.5 * length);
@@ -142,10 +147,13 @@ fn cross(walker: &mut CellWalker<'_>, start: DVec3, direction: DVec3) -> Crossin
             assert!(out.cells.len() < 100_000, "a line goes round in circles");
             at += length;
             slack = 1e-6 * walker.size(cell);
-            inside = match beyond {
-                Beyond::Cell(next) => Some(next),
-                Beyond::Outside | Beyond::Hidden => None,
-            };
+            stuck = if length > 0.0 { 0 } else { stuck + 1 };
+            if stuck > 100 {
+                out.moved_on += 1;
+                (stuck, at) = (0, at + 1e-5 * walker.size(cell));
+                break;
+            }
+            (from, inside) = (inside, beyond);
         }
         out.end = at;
     }
@@ -166,9 +174,8 @@ fn linear_and_quadratic_fields_are_exact_on_distorted_cells_of_every_type() {
     let linear = |p: DVec3| 1.0 + 2.0 * p.x - 3.0 * p.y + 0.5 * p.z;
     let linear_gradient = |_: DVec3| DVec3::new(2.0, -3.0, 0.5);
     let quadratic = |p: DVec3| p.x * p.x - 2.0 * p.y * p.z + 0.3 * p.x * p.z + p.y;
-    let quadratic_gradient = |p: DVec3| {
-        DVec3::new(2.0 * p.x + 0.3 * p.z, 1.0 - 2.0 * p.z, 0.3 * p.x - 2.0 * p.y)
-    };
+    let quadratic_gradient =
+        |p: DVec3| DVec3::new(2.0 * p.x + 0.3 * p.z, 1.0 - 2.0 * p.z, 0.3 * p.x - 2.0 * p.y);
     for split in SPLITS {
         let data = Dataset::UnstructuredGrid(grid(6, 0.2, split));
         let fields = [
@@ -226,7 +233,7 @@ fn gradients_are_those_of_the_values() {
                 if length < 0.02 || matches!(split, Split::Polyhedra) {
                     continue;
                 }
-                let along = |axis: DVec3| {
+                let mut along = |axis: DVec3| {
                     let [a, b] = [-h, h].map(|d| walker.sample(cell, place + axis * d).0);
                     (b - a) / (2.0 * h)
                 };
@@ -243,27 +250,34 @@ fn gradients_are_those_of_the_values() {
 fn the_value_is_continuous_across_faces() {
     let bell = |p: DVec3| (-(p - 0.45).length_squared() / 0.08).exp();
     for split in SPLITS {
-        let data = Dataset::UnstructuredGrid(grid(7, 0.2, split));
-        let field = field_of(&data, bell, Reconstruction::Cubic);
-        let mut walker = field.walker();
-        let mut random = SplitMix64::new(8);
-        let (mut worst, mut faces) = (0.0f64, 0);
-        for _ in 0..200 {
-            let start = DVec3::new(random.unit(), random.unit(), -0.5);
-            let direction = DVec3::new(0.1, -0.2, 1.0).normalize();
-            let crossing = cross(&mut walker, start, direction);
-            let mut at = walker.enter(start, direction, 9.0, 0.0).map_or(0.0, |e| e.distance);
-            for pair in crossing.cells.windows(2) {
-                at += pair[0].1;
-                let place = start + direction * at;
-                let [a, b] = [pair[0].0, pair[1].0].map(|c| walker.sample(c, place).0);
-                worst = worst.max((a - b).abs());
-                faces += 1;
+        // Lines leave through planes, or the triangles of a bent face. There the curved faces of
+        // hexahedra, wedges and pyramids are somewhere else, and the difference of the polynomials
+        // counts, by the distance between the two.
+        let bent = !matches!(split, Split::Tetrahedra | Split::Polyhedra);
+        for (share, bound) in [(0.0, 3e-6), (0.2, if bent { 2e-2 } else { 3e-6 })] {
+            let data = Dataset::UnstructuredGrid(grid(7, share, split));
+            let field = field_of(&data, bell, Reconstruction::Cubic);
+            let mut walker = field.walker();
+            let mut random = SplitMix64::new(8);
+            let (mut worst, mut faces) = (0.0f64, 0);
+            for _ in 0..200 {
+                let start = DVec3::new(random.unit(), random.unit(), -0.5);
+                let direction = DVec3::new(0.1, -0.2, 1.0).normalize();
+                let crossing = cross(&mut walker, start, direction);
+                let mut at = walker.enter(start, direction, 9.0, 0.0).map_or(0.0, |e| e.distance);
+                for pair in crossing.cells.windows(2) {
+                    at += pair[0].1;
+                    let place = start + direction * at;
+                    let [a, b] = [pair[0].0, pair[1].0].map(|c| walker.sample(c, place).0);
+                    worst = worst.max((a - b).abs());
+                    faces += 1;
+                }
             }
+            assert!(
+                faces > 500 && worst < bound,
+                "{split:?} {share}: {worst:.1e} at {faces} faces"
+            );
         }
-        // The faces of hexahedra are curved, and lines leave through the triangles of a fan; there
-        // the polynomials' differences count, by the distance between the two.
-        assert!(faces > 500 && worst < 3e-4, "{split:?}: {worst:.1e} at {faces} faces");
     }
 }
 
@@ -296,7 +310,10 @@ fn lines_through_points_edges_and_faces_cross_the_whole_cube() {
                 }
                 let chord = (far - near).max(0.0);
                 assert!(
-                    (inside - chord).abs() < 1e-5 && crossing.gaps == 0,
+                    (inside - chord).abs() < 1e-5
+                        && crossing.gaps == 0
+                        // A line that only touches the cube enters and leaves again and again.
+                        && (crossing.moved_on == 0 || chord < 1e-9),
                     "{split:?} {share} through {place} along {direction}: {inside} of {chord}"
                 );
             }
@@ -342,9 +359,7 @@ fn a_border_of_blocks_is_no_seam() {
 fn a_line_leaves_at_a_hole_and_enters_again() {
     let mut data = grid(9, 0.0, Split::Hexahedra);
     // The cells in the middle are away: x, y and z between 3/8 and 5/8.
-    let away = |c: usize| {
-        [c % 8, c / 8 % 8, c / 64].iter().all(|k| (3..5).contains(k))
-    };
+    let away = |c: usize| [c % 8, c / 8 % 8, c / 64].iter().all(|k| (3..5).contains(k));
     let mut cells = Cells::new();
     (0..512).filter(|c| !away(*c)).for_each(|c| cells.push(data.cells.get(c).iter().copied()));
     data.types.truncate(cells.len());
@@ -426,7 +441,7 @@ fn hidden_cells_are_seen_behind_faces_and_nan_cells_have_no_value() {
     let entry = walker.enter(start, DVec3::Z, 9.0, 0.0).unwrap();
     assert!((entry.distance - 1.0).abs() < 1e-12 && !entry.from_hidden);
     let place = start + DVec3::Z * 1.3;
-    assert_eq!(walker.leave(21, place, DVec3::Z).unwrap().1, Beyond::Hidden);
+    assert_eq!(walker.leave(21, place, DVec3::Z, Beyond::Cell(5)).unwrap().1, Beyond::Hidden);
     let again = walker.enter(start + DVec3::Z * 1.5, DVec3::Z, 9.0, 1e-6).unwrap();
     assert!(again.from_hidden && (again.distance - 0.25).abs() < 1e-12, "{again:?}");
     // Cell 40 = 0 + 4 (2 + 4 · 2).
@@ -441,10 +456,8 @@ fn where_blocks_overlap_a_line_goes_on_in_the_other() {
         Dataset::ImageData(ImageData::new([7, 5, 5], DVec3::new(low, 0.0, 0.0), spacing))
     };
     // The second begins at 0.37, in the middle of a cell of the first, which ends at 0.6.
-    let data = [block(0.0), block(0.37)].map(|data| crate::model::Block {
-        name: String::new(),
-        data,
-    });
+    let data =
+        [block(0.0), block(0.37)].map(|data| crate::model::Block { name: String::new(), data });
     let data = Dataset::MultiBlock(data.into());
     let field = field_of(&data, |p| p.x, Reconstruction::Linear);
     let mut walker = field.walker();

@@ -35,8 +35,8 @@ pub enum Beyond {
     Hidden,
 }
 
-/// Follows lines through the cells of a field, one line at a time. It keeps the cells that it passed
-/// last, prepared for further lines; what it returns does not depend on them.
+/// Follows lines through the cells of a field, one line at a time. It keeps the cells that it
+/// passed last, prepared for further lines; what it returns does not depend on them.
 pub struct CellWalker<'a> {
     field: &'a CellField,
     kept: Vec<Option<Box<(u32, PreparedCell)>>>,
@@ -76,17 +76,11 @@ impl<'a> CellWalker<'a> {
     }
 
     /// The first cell that the line from `at` in `direction`, of length one, is in or enters within
-    /// `most`. `slack` is how far `at` may be beyond the face that it left through: faces within this
-    /// distance are entered, and not left. `None` when there is none.
+    /// `most`. `slack` is how far `at` may be beyond the face that it left through: faces within
+    /// this distance are entered, and not left. `None` when there is none.
     ///
     /// A line that is in a cell already, as where blocks overlap, gets this cell at distance 0.
-    pub fn enter(
-        &mut self,
-        at: DVec3,
-        direction: DVec3,
-        most: f64,
-        slack: f64,
-    ) -> Option<Entry> {
+    pub fn enter(&mut self, at: DVec3, direction: DVec3, most: f64, slack: f64) -> Option<Entry> {
         let field = self.field;
         let passage =
             field.border.first_passage(&field.mesh, at, direction, f64::INFINITY, slack)?;
@@ -113,10 +107,12 @@ impl<'a> CellWalker<'a> {
         mut cell: u32,
     ) -> (f64, u32, Beyond) {
         let mut from_start = distance;
+        let mut from = Beyond::Outside;
         for _ in 0..MOST_CELLS {
             let place = at + direction * from_start;
-            let Some((length, beyond)) = self.leave(cell, place, -direction) else { break };
+            let Some((length, beyond)) = self.leave(cell, place, -direction, from) else { break };
             from_start -= length;
+            from = Beyond::Cell(cell);
             match beyond {
                 Beyond::Cell(next) if from_start > 0.0 => cell = next,
                 beyond => return (from_start.max(0.0), cell, beyond),
@@ -126,9 +122,21 @@ impl<'a> CellWalker<'a> {
     }
 
     /// The distance at which the line from `at`, in the cell, in `direction` leaves it, and what
-    /// lies beyond. `None` when it passes no face of the cell outwards: rounding at an edge.
-    pub fn leave(&mut self, cell: u32, at: DVec3, direction: DVec3) -> Option<(f64, Beyond)> {
-        let (distance, beyond) = self.prepared(cell).way_out(at, direction)?;
+    /// lies beyond. `None` when it passes no face of the cell outwards: rounding at an edge. `from`
+    /// is where it came from: at an edge of a bent face, it does not go back there at once.
+    pub fn leave(
+        &mut self,
+        cell: u32,
+        at: DVec3,
+        direction: DVec3,
+        from: Beyond,
+    ) -> Option<(f64, Beyond)> {
+        let from = match from {
+            Beyond::Cell(cell) => cell,
+            Beyond::Outside => OUTSIDE,
+            Beyond::Hidden => HIDDEN,
+        };
+        let (distance, beyond) = self.prepared(cell).way_out(at, direction, from)?;
         let beyond = match beyond {
             OUTSIDE => Beyond::Outside,
             HIDDEN => Beyond::Hidden,
@@ -144,7 +152,7 @@ impl<'a> CellWalker<'a> {
         let Some(kept) = &kept[slot] else { unreachable!("the slot was filled") };
         let prepared = &kept.1;
         let at = at - prepared.origin;
-        if !prepared.has_values || !shares(prepared, at, of_corners) {
+        if !prepared.has_values || !shares(&prepared.corners, &prepared.map, at, of_corners) {
             return (f64::NAN, DVec3::NAN);
         }
         prepared.polynomials.blend(at, of_corners)
