@@ -243,8 +243,8 @@ impl Field {
     }
 }
 
-/// Lengths of steps and cells: far below a wavelength of light and far beyond any test section. With
-/// steps that are shorter by hundreds of digits, marches do not end.
+/// Lengths of steps and cells: far below a wavelength of light and far beyond any test section.
+/// With steps that are shorter by hundreds of digits, marches do not end.
 pub(crate) const LENGTHS_M: std::ops::RangeInclusive<f64> = 1e-12..=1e12;
 
 /// Checks a lattice and returns its number of nodes.

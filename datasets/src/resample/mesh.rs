@@ -369,13 +369,10 @@ impl Mesh {
     pub(super) fn is_hidden(&self, cell: usize) -> bool {
         self.hidden.get(cell).copied().unwrap_or(false)
     }
-
     /// The mesh with all lengths times `factor`: from the unit of a file to metres.
     #[must_use]
     pub fn scaled(mut self, factor: f64) -> Mesh {
-        if factor != 1.0 {
-            self.points.iter_mut().for_each(|p| *p *= factor);
-        }
+        self.points.iter_mut().for_each(|p| *p *= factor);
         self
     }
 

@@ -7,8 +7,8 @@
 //! are divided into tetrahedra and counted. Between the points of the mesh, values are those of
 //! polynomials fitted to the values around ([`Reconstruction`]).
 //!
-//! [`CellField`] has the same values, and their gradients, in the cells themselves, without a lattice
-//! (`on_cells`).
+//! [`CellField`] has the same values, and their gradients, in the cells themselves, without a
+//! lattice (`on_cells`).
 //!
 //! [`Mark`] classifies a node. [`Report`] measures the loss of accuracy by sampling the lattice
 //! back at the points of the mesh.

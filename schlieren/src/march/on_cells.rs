@@ -27,9 +27,8 @@ const GAP: f64 = 1e-3;
 const SLACK: f64 = 1e-6;
 /// A piece shorter than this, in sizes of the cell, is no progress.
 const NO_PROGRESS: f64 = 1e-9;
-/// After so many pieces without progress, rounding leads a ray round an edge. A thousand cells meet
-/// at the axis of a fan.
-const STUCK: u32 = 4096;
+/// After so many pieces without progress, rounding leads a ray round an edge.
+const STUCK: u32 = 256;
 /// How far a ray without a way out is moved on, in sizes of the cell.
 const MOVED_ON: f64 = 1e-5;
 /// Cells that a ray crosses, at most, and the length of its path in diagonals of the box.
@@ -259,11 +258,13 @@ impl Piecewise<'_, '_> {
             let Some((length_m, beyond)) = way else {
                 self.counters.moved_on += 1;
                 self.ray.drift(MOVED_ON * size_m / speed);
-                (stuck, inside, before) = (0, Beyond::Outside, gas.outside);
+                let near = self.walker.near(cell, self.ray.position_m());
+                (stuck, from, before) = (0, Beyond::Outside, gas.outside);
+                inside = near.map_or(Beyond::Outside, Beyond::Cell);
                 continue;
             };
             stuck = if length_m <= NO_PROGRESS * size_m { stuck + 1 } else { 0 };
-            if length_m > 0.0 && !self.cross(cell, length_m / speed) {
+            if length_m != 0.0 && !self.cross(cell, length_m / speed) {
                 return End::Stopped(Node::Blank);
             }
             before = match beyond {

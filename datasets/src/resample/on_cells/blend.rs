@@ -1,5 +1,5 @@
-//! The mean of the corners' polynomials, weighted by their shares, and its gradient, for eight
-//! corners at once.
+//! The mean of the corners' polynomials, weighted by their shares, and its gradient, for four
+//! corners at once: a tetrahedron's, or half of a hexahedron's.
 //!
 //! Coefficients are f32 in memory already. Values are taken relative to the first corner's, and
 //! places to its place, so that f32 keeps the digits of differences.
@@ -8,12 +8,12 @@ use crate::resample::reconstruct::{Expansion, TERMS};
 use glam::DVec3;
 
 /// Corners that are evaluated at once.
-pub(super) const LANES: usize = 8;
+pub(super) const LANES: usize = 4;
 
 type Lane = [f32; LANES];
 const ZERO: Lane = [0.0; LANES];
 
-/// Shares of eight corners and their gradients.
+/// Shares of four corners and their gradients.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Share {
     n: Lane,
@@ -51,7 +51,7 @@ pub(super) struct Polynomials {
     linear: bool,
 }
 
-/// Those of eight corners: a lane for each.
+/// Those of four corners: a lane for each.
 #[derive(Clone)]
 struct Group {
     place: [Lane; 3],
@@ -116,7 +116,7 @@ impl Polynomials {
 }
 
 fn total(l: Lane) -> f32 {
-    ((l[0] + l[4]) + (l[1] + l[5])) + ((l[2] + l[6]) + (l[3] + l[7]))
+    (l[0] + l[2]) + (l[1] + l[3])
 }
 
 impl Group {

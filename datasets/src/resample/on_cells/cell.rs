@@ -16,6 +16,10 @@ const BACK: f64 = 1e-6;
 /// Faces this near, as a part of the cell's size, are passed at once.
 const AT_ONCE: f64 = 1e-11;
 
+/// A cell is inside out when a line comes through one of its faces outwards, by more than this
+/// cosine: in gas, no ray is bent that much between two cells.
+const INSIDE_OUT: f64 = 0.01;
+
 /// A cell with what lines need of it. Places are relative to its first corner.
 #[derive(Default)]
 pub(super) struct PreparedCell {
@@ -106,22 +110,19 @@ impl PreparedCell {
     /// The distance from `at` along `direction` to where a line leaves the cell, and what lies
     /// beyond. `None` when it passes no face outwards: rounding at an edge, or a cell that folds.
     ///
+    /// Meshes whose points were moved too far have convex cells that are inside out, and overlap
+    /// their neighbours. Lines go back through these: the distance is negative, and what is counted
+    /// twice cancels.
+    ///
     /// A line that runs along the ridge of a bent face passes it there and back at one place. It
     /// came `from` there, and does not go back at once.
     pub(super) fn way_out(&self, at: DVec3, direction: DVec3, from: u32) -> Option<(f64, u32)> {
         let at = at - self.origin;
         if self.convex {
-            let mut best: Option<(f64, u32)> = None;
-            for f in &self.faces {
-                let speed = f.normal.dot(direction);
-                if speed > 0.0 {
-                    let distance = (f.offset - f.normal.dot(at)) / speed;
-                    if best.is_none_or(|b| distance < b.0) {
-                        best = Some((distance, f.beyond));
-                    }
-                }
-            }
-            return best.map(|(distance, beyond)| (distance.max(0.0), beyond));
+            return match self.is_behind(direction, from) {
+                true => self.through_planes(at, -direction).map(|(d, beyond)| (-d, beyond)),
+                false => self.through_planes(at, direction).map(|(d, beyond)| (d.max(0.0), beyond)),
+            };
         }
         let (back, at_once) = (-BACK * self.size, AT_ONCE * self.size);
         let mut ways = Ways::default();
@@ -145,6 +146,42 @@ impl PreparedCell {
         }
         let way = ways.ahead.or(ways.behind).or(ways.returning);
         way.map(|(distance, beyond)| (distance.max(0.0), beyond))
+    }
+
+    /// Whether the cell is inside out, and lies on this side of the face that the line comes
+    /// through.
+    fn is_behind(&self, direction: DVec3, from: u32) -> bool {
+        let mut entrances = self.faces.iter().filter(|f| f.beyond == from && from < NO_FACE);
+        let outwards = |f: &Face| f.normal.dot(direction) > INSIDE_OUT;
+        entrances.next().is_some_and(outwards) && entrances.all(outwards)
+    }
+
+    /// The first plane of a convex cell that a line passes outwards.
+    fn through_planes(&self, at: DVec3, direction: DVec3) -> Option<(f64, u32)> {
+        let mut best: Option<(f64, u32)> = None;
+        for f in &self.faces {
+            let speed = f.normal.dot(direction);
+            if speed > 0.0 {
+                let distance = (f.offset - f.normal.dot(at)) / speed;
+                if best.is_none_or(|b| distance < b.0) {
+                    best = Some((distance, f.beyond));
+                }
+            }
+        }
+        best
+    }
+
+    /// Whether a place is between the planes of all faces.
+    pub(super) fn contains(&self, at: DVec3) -> bool {
+        let at = at - self.origin;
+        let margin = 1e-9 * self.size;
+        let below = |f: &Face| f.normal.dot(at) - f.offset <= f.thickness + margin;
+        self.faces.iter().all(below)
+    }
+
+    /// The cells behind its faces.
+    pub(super) fn neighbours(&self) -> impl Iterator<Item = u32> {
+        self.faces.iter().map(|f| f.beyond).filter(|&b| b < NO_FACE)
     }
 
     /// Calls `passed` with the distances at which a line passes a face outwards.

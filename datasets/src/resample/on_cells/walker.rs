@@ -10,6 +10,8 @@ use glam::DVec3;
 /// Places for prepared cells: a power of two. Rays that are near each other pass the same cells,
 /// a few hundred each.
 const KEPT: usize = 1024;
+/// Cells that are looked at for one that a place is in, at most.
+const MOST_NEAR: usize = 200;
 /// Cells that a line passes on the way back to where it is, at most.
 const MOST_CELLS: usize = 1_000_000;
 
@@ -121,7 +123,8 @@ impl<'a> CellWalker<'a> {
         (from_start.max(0.0), cell, Beyond::Outside)
     }
 
-    /// The distance at which the line from `at`, in the cell, in `direction` leaves it, and what
+    /// The distance at which the line from `at`, in the cell, in `direction` leaves it (negative in
+    /// one that is inside out and overlaps the cell that it comes from), and what
     /// lies beyond. `None` when it passes no face of the cell outwards: rounding at an edge. `from`
     /// is where it came from: at an edge of a bent face, it does not go back there at once.
     pub fn leave(
@@ -143,6 +146,22 @@ impl<'a> CellWalker<'a> {
             cell => Beyond::Cell(cell),
         };
         Some((distance, beyond))
+    }
+
+    /// A cell that a place is in, of those that are near a cell: its neighbours, and theirs.
+    pub fn near(&mut self, cell: u32, at: DVec3) -> Option<u32> {
+        let mut seen = vec![cell];
+        let mut next = 0;
+        while next < seen.len() && seen.len() < MOST_NEAR {
+            let prepared = self.prepared(seen[next]);
+            if prepared.contains(at) {
+                return Some(seen[next]);
+            }
+            let more: Vec<u32> = prepared.neighbours().collect();
+            seen.extend(more.into_iter().filter(|c| !seen.contains(c)).collect::<Vec<u32>>());
+            next += 1;
+        }
+        None
     }
 
     /// Value and gradient at a place in a cell; NaN in a cell without values.
