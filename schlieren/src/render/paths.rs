@@ -51,8 +51,7 @@ impl TestSection {
         let view = if against_light { ReversedPaths::view(&self.view) } else { self.view };
         if let Some(gas) = self.cells.get(line) {
             let rays = measure.then_some(MEASURED_RAYS);
-            let mut planned =
-                on_cells::planned(gas, view, quantities, march.tolerance_rad, rays);
+            let mut planned = on_cells::planned(gas, view, quantities, march.tolerance_rad, rays);
             if march.device == Device::Auto {
                 planned.warnings.push(
                     "computed on the CPU: the GPU traces light on lattices, not on cells".into(),

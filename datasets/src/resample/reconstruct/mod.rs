@@ -25,9 +25,9 @@ pub(super) use expansion::Expansion;
 pub(super) use neighbours::first_at_place;
 pub(super) use polynomial::TERMS;
 
+use super::mesh::Mesh;
 use cell_moments::CellMoments;
 use expansion::Fit;
-use super::mesh::Mesh;
 use glam::DVec3;
 use neighbours::{Incidence, Neighbourhood};
 use rayon::prelude::*;
