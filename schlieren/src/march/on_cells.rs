@@ -25,7 +25,7 @@ const GAP: f64 = 1e-3;
 /// How far a bent ray may be beside the face that its straight piece left through, in sizes of the
 /// cell.
 const SLACK: f64 = 1e-6;
-/// A piece shorter than this, in sizes of the cell, is no progress.
+/// A ray that gets farther by less than this, in sizes of the cell, makes no progress.
 const NO_PROGRESS: f64 = 1e-9;
 /// After so many pieces without progress, rounding leads a ray round an edge.
 const STUCK: u32 = 256;
@@ -235,7 +235,7 @@ impl Piecewise<'_, '_> {
         let mut slack_m = SLACK * self.paths.typical_cell_m;
         let mut gap_m = GAP * self.paths.typical_cell_m;
         let most_m = MOST_DIAGONALS * self.paths.size_m.length();
-        let mut stuck = 0;
+        let (mut stuck, mut farthest_m) = (0, f64::NEG_INFINITY);
         let (mut from, mut inside) = (Beyond::Outside, Beyond::Outside);
         for _ in 0..MOST_PIECES {
             let w = self.ray.w();
@@ -263,10 +263,13 @@ impl Piecewise<'_, '_> {
                 inside = near.map_or(Beyond::Outside, Beyond::Cell);
                 continue;
             };
-            stuck = if length_m <= NO_PROGRESS * size_m { stuck + 1 } else { 0 };
             if length_m != 0.0 && !self.cross(cell, length_m / speed) {
                 return End::Stopped(Node::Blank);
             }
+            // Where cells are inside out, a ray goes back and forth.
+            let progress = self.ray.tau_m > farthest_m + NO_PROGRESS * size_m;
+            (stuck, farthest_m) =
+                if progress { (0, self.ray.tau_m) } else { (stuck + 1, farthest_m) };
             before = match beyond {
                 Beyond::Hidden => gas.hidden,
                 Beyond::Cell(_) | Beyond::Outside => gas.outside,
