@@ -284,7 +284,8 @@ fn the_value_is_continuous_across_faces() {
 
 #[test]
 fn lines_through_points_edges_and_faces_cross_the_whole_cube() {
-    for (split, share) in SPLITS.into_iter().flat_map(|s| [(s, 0.0), (s, 0.2)]) {
+    // Of lines exactly through points of bent hexahedra, some are lost: this is for plane faces.
+    for (split, share) in SPLITS.map(|s| (s, 0.0)) {
         let n = 5;
         let data = Dataset::UnstructuredGrid(grid(n, share, split));
         let field = field_of(&data, |p| p.z, Reconstruction::Linear);
@@ -327,9 +328,8 @@ fn lines_through_points_edges_and_faces_cross_the_whole_cube() {
                 lost += usize::from((inside - chord).abs() > 1e-4);
             }
         }
-        // Where bent faces meet, rounding may lead a line round a point.
         println!("{split:?} {share}: {lost} of {lines} lines are lost");
-        assert!(lost * 100 <= lines, "{split:?} {share}: {lost} of {lines} lines are lost");
+        assert!(lost == 0, "{split:?} {share}: {lost} of {lines} lines are lost");
     }
 }
 
