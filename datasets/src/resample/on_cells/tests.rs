@@ -312,7 +312,8 @@ fn lines_through_points_edges_and_faces_cross_the_whole_cube() {
                     }
                 }
                 let chord = (far - near).max(0.0);
-                // A line in a side of the cube, or through one of its points only, enters and leaves
+                // A line in a side of the cube, or through one of its points only, enters and
+                // leaves
                 // again and again, and is moved on by 1e-5 of a cell.
                 let in_side = |a: usize| direction[a] == 0.0 && [0.0, 1.0].contains(&start[a]);
                 let along_border = chord < 1e-9 || (0..3).any(in_side);
