@@ -62,8 +62,11 @@ pub enum FieldError {
         /// Its number of nodes.
         wanted: usize,
     },
-    /// A spacing is not a positive number.
-    #[error("spacing along {axis} is {spacing_m} m; it must be a positive number")]
+    /// A spacing is not a length that light passes.
+    #[error(
+        "spacing along {axis} is {spacing_m} m; it must be from 1e-12 to 1e12 m. Check the unit of \
+         length (length_unit_m in a scene, --length-unit)"
+    )]
     Spacing {
         /// x, y or z.
         axis: char,
@@ -240,6 +243,10 @@ impl Field {
     }
 }
 
+/// Lengths of steps and cells: far below a wavelength of light and far beyond any test section.
+/// With steps that are shorter by hundreds of digits, marches do not end.
+pub(crate) const LENGTHS_M: std::ops::RangeInclusive<f64> = 1e-12..=1e12;
+
 /// Checks a lattice and returns its number of nodes.
 pub(crate) fn check_lattice(
     dims: [usize; 3],
@@ -250,7 +257,7 @@ pub(crate) fn check_lattice(
         if dims[c] < 2 {
             return Err(FieldError::TooFew { axis, nodes: dims[c] });
         }
-        if !(spacing_m[c] > 0.0 && spacing_m[c].is_finite()) {
+        if !LENGTHS_M.contains(&spacing_m[c]) {
             return Err(FieldError::Spacing { axis, spacing_m: spacing_m[c] });
         }
     }
@@ -356,6 +363,10 @@ mod tests {
         assert!(err([4, 4, 4], [1.0; 3], ok([4, 4, 3]), 1.0).contains("48 values"));
         assert!(err([4, 4, 4], [1.0, -1.0, 1.0], ok([4, 4, 4]), 1.0).contains("along y"));
         assert!(err([4, 4, 4], [1.0, f64::NAN, 1.0], ok([4, 4, 4]), 1.0).contains("NaN"));
+        for spacing_m in [1e-300, 1e300, f64::INFINITY, 0.0] {
+            let message = err([4, 4, 4], [1.0, 1.0, spacing_m], ok([4, 4, 4]), 1.0);
+            assert!(message.contains("along z") && message.contains("--length-unit"), "{message}");
+        }
         assert!(err([4, 4, 4], [1.0; 3], ok([4, 4, 4]), 0.0).contains("n0 is 0"));
         assert!(err([4, 4, 4], [1.0; 3], vec![-1.0; 64], 1.0).contains("-1"));
         assert!(err([4, 4, 4], [1.0; 3], vec![f32::NAN; 64], 1.0).contains("no gas"));

@@ -48,6 +48,7 @@ mod derivative_bounds;
 pub mod field;
 pub mod film;
 pub mod filter;
+pub mod gas_on_cells;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 pub mod index;

@@ -329,7 +329,7 @@ impl Plan {
         rays: usize,
         cache: &FieldCache,
     ) -> MeasuredError {
-        let starts = sample_starts(field, &view, rays.max(1));
+        let starts = sample_starts(field.size_m(), field.centre_m(), &view, rays.max(1));
         let mut planned = vec![Exit::UNDISTURBED; starts.len()];
         self.paths_with(field, view, cache).trace_parallel(&starts, &mut planned);
         let mut refined = planned.clone();
@@ -404,7 +404,7 @@ fn resolution_error(difference: f64, largest: f64) -> f64 {
 
 /// Largest and root mean square difference of deflection, and the number of rays compared: those
 /// that are free in both.
-fn compare(a: &[Exit], b: &[Exit]) -> (f64, f64, usize) {
+pub(crate) fn compare(a: &[Exit], b: &[Exit]) -> (f64, f64, usize) {
     let (mut max, mut sum, mut rays) = (0.0f64, 0.0, 0);
     for (a, b) in a.iter().zip(b) {
         if a.status == Status::Free && b.status == Status::Free {
@@ -421,9 +421,14 @@ fn compare(a: &[Exit], b: &[Exit]) -> (f64, f64, usize) {
 
 /// Starts spread evenly over the image of the field, by the R2 sequence of Roberts 2018, the
 /// two-dimensional analogue of the golden ratio sequence.
-fn sample_starts(field: &Field, view: &View, rays: usize) -> Vec<Start> {
-    let half = [view.right, view.up].map(|axis| 0.5 * (field.size_m() * axis.abs()).element_sum());
-    let offset = [view.right, view.up].map(|axis| (field.centre_m() - view.centre_m).dot(axis));
+pub(crate) fn sample_starts(
+    size_m: DVec3,
+    centre_m: DVec3,
+    view: &View,
+    rays: usize,
+) -> Vec<Start> {
+    let half = [view.right, view.up].map(|axis| 0.5 * (size_m * axis.abs()).element_sum());
+    let offset = [view.right, view.up].map(|axis| (centre_m - view.centre_m).dot(axis));
     (0..rays)
         .map(|i| {
             let at = [0.754_877_666_246_692_7, 0.569_840_290_998_053_3]

@@ -65,7 +65,7 @@ pub struct Probe {
 /// As [`crate::render::render`].
 pub fn probe(scene: &Scene, section: &TestSection, pixel: [f64; 2]) -> Result<Probe, RenderError> {
     let framing = framing(scene, section);
-    let n0 = section.fields[0].n0();
+    let n0 = section.n0(0);
     let t = technique(scene, 0, &framing, n0, false)?;
     let against_light = matches!(t, Technique::Bos(_));
     let planned = section.paths(scene, 0, PathQuantities { opd: true }, against_light, true)?;

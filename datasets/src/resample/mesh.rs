@@ -369,6 +369,12 @@ impl Mesh {
     pub(super) fn is_hidden(&self, cell: usize) -> bool {
         self.hidden.get(cell).copied().unwrap_or(false)
     }
+    /// The mesh with all lengths times `factor`: from the unit of a file to metres.
+    #[must_use]
+    pub fn scaled(mut self, factor: f64) -> Mesh {
+        self.points.iter_mut().for_each(|p| *p *= factor);
+        self
+    }
 
     /// Bounding box of all finite points.
     pub fn bounds(&self) -> (DVec3, DVec3) {

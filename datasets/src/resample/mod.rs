@@ -7,11 +7,15 @@
 //! are divided into tetrahedra and counted. Between the points of the mesh, values are those of
 //! polynomials fitted to the values around ([`Reconstruction`]).
 //!
+//! [`CellField`] has the same values, and their gradients, in the cells themselves, without a
+//! lattice (`on_cells`).
+//!
 //! [`Mark`] classifies a node. [`Report`] measures the loss of accuracy by sampling the lattice
 //! back at the points of the mesh.
 
 mod extrude;
 mod mesh;
+mod on_cells;
 mod rasterize;
 mod reconstruct;
 mod report;
@@ -20,6 +24,7 @@ mod shape;
 mod smooth;
 
 pub use mesh::{Mesh, Plane};
+pub use on_cells::{Beyond, CellField, CellReport, CellWalker, Entry};
 pub use reconstruct::{FitQuality, Reconstruction};
 pub use report::{Report, ResamplingError};
 pub use revolve::{revolve, revolved_bounds};
@@ -270,17 +275,7 @@ pub fn resample(
             cure: "from 1 to 8 are allowed",
         });
     }
-    let (given, wanted) = match samples {
-        Samples::Points(v) => (v.len(), mesh.num_points()),
-        Samples::Cells(v) => (v.len(), mesh.num_cells()),
-    };
-    if given != wanted {
-        return Err(ResampleError::Count {
-            found: given,
-            points: mesh.num_points(),
-            cells: mesh.num_cells(),
-        });
-    }
+    check_count(mesh, samples)?;
     let averaged;
     let (points, cells) = match samples {
         Samples::Points(v) => (v, None),
@@ -300,6 +295,18 @@ pub fn resample(
     let fit = field.quality(mesh);
     let report = Report { fit, ..Report::new(mesh, &marks, counts, resampling_error) };
     Ok(ResampledField { lattice: *lattice, values, marks, report })
+}
+
+/// Whether there is a value for each point or cell.
+fn check_count(mesh: &Mesh, samples: Samples<'_>) -> Result<(), ResampleError> {
+    let (found, wanted) = match samples {
+        Samples::Points(v) => (v.len(), mesh.num_points()),
+        Samples::Cells(v) => (v.len(), mesh.num_cells()),
+    };
+    if found == wanted {
+        return Ok(());
+    }
+    Err(ResampleError::Count { found, points: mesh.num_points(), cells: mesh.num_cells() })
 }
 
 #[cfg(test)]

@@ -30,9 +30,9 @@ const MAX_STEPS: usize = 25;
 const MIN_JACOBIAN_RATIO: f64 = 1e-6;
 
 /// Shape functions and their derivatives along the three parameters.
-type Basis = ([f64; 8], [DVec3; 8]);
+pub(super) type Basis = ([f64; 8], [DVec3; 8]);
 
-fn basis(shape: &Shape, q: DVec3) -> Basis {
+pub(super) fn basis(shape: &Shape, q: DVec3) -> Basis {
     let (r, s, t) = (q.x, q.y, q.z);
     let (r1, s1, t1) = (1.0 - r, 1.0 - s, 1.0 - t);
     let mut n = [0.0; 8];

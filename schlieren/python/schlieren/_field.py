@@ -174,6 +174,7 @@ class Field:
         `span`, `revolve` : the depth of a two-dimensional flow, or whether it is half of an
         axisymmetric one. `smoothing_nodes` : standard deviation of the smoothing of shocks.
         `resample_nodes`, `resample_samples`, `reconstruction` : how meshes become a lattice.
+        `on_cells` : whether light is traced through the cells of the mesh, without a lattice.
         `outside`, `hidden` : ``"blank"``, ``"solid"`` or ``"gas"``. `reference_n_minus_1` : of
         the medium around the field. `model` : ``"auto"``, ``"ciddor"`` or ``"gladstone-dale"``.
 

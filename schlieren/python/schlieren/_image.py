@@ -44,8 +44,8 @@ class Report:
         With bodies.
     march : str
         Method, interpolant and step.
-    grid : tuple of int
-        Nodes of the field.
+    grid : tuple of int or None
+        Nodes of the field; none for light through the cells of a mesh.
     index_formula : str
     reference_n_minus_1 : float
         Of the medium around the field.
@@ -66,7 +66,7 @@ class Report:
     largest_deflection_rad: float | None
     silhouette_error_px: float | None
     march: str
-    grid: tuple
+    grid: tuple | None
     index_formula: str
     reference_n_minus_1: float
     n_minus_1_range: tuple

@@ -30,17 +30,18 @@ def _options(given):
     for name, check in checks.items():
         if given.get(name) is not None:
             flow[name] = check(name, given[name])
-    if not isinstance(given.get("revolve", False), (bool, np.bool_)):
-        raise TypeError(f"revolve is {given['revolve']!r}; give True or False")
-    if given.get("revolve"):
-        flow["revolve"] = True
+    for switch in ("revolve", "on_cells"):
+        if not isinstance(given.get(switch, False), (bool, np.bool_)):
+            raise TypeError(f"{switch} is {given[switch]!r}; give True or False")
+        if given.get(switch):
+            flow[switch] = True
     return flow
 
 
 #: Names of arguments that all ways to make a field have.
 OPTIONS = (
     "span", "revolve", "resample_nodes", "resample_samples", "reconstruction", "smoothing_nodes",
-    "outside", "hidden", "reference_n_minus_1", "model",
+    "outside", "hidden", "reference_n_minus_1", "model", "on_cells",
 )  # fmt: skip
 UNITS = ("density_unit", "temperature_unit", "pressure_unit", "length_unit")
 MEANING = (*QUANTITIES, *MEDIA, "species", "curves", "curve_rule")

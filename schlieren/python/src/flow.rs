@@ -73,7 +73,7 @@ impl Flow {
         // Scenes come from JSON, so they can be written as JSON.
         let of = made_for(scene).unwrap_or_default();
         if let Some(mut kept) = self.take_kept().filter(|k| k.of == of) {
-            let centre_m = kept.section.fields[0].centre_m();
+            let centre_m = kept.section.centre_m();
             kept.section.view = scene.view.direction.view(centre_m).map_err(|e| errors::of(&e))?;
             return Ok((of, kept.section));
         }
@@ -155,7 +155,7 @@ impl Flow {
             let rendered = rendered.map_err(|e| errors::of_render(&e))?;
             let seconds = [read_secs, start.elapsed().as_secs_f64() - read_secs];
             let input = section.input.clone();
-            let dims = section.fields[0].dims();
+            let dims = section.grid();
             self.keep(of, section);
             Ok(Output::new(rendered, scene, input, dims, seconds))
         };

@@ -20,7 +20,7 @@ pub(crate) struct Output {
     /// How the field was made.
     input: Option<input::Report>,
     /// Nodes of the field along its axes.
-    dims: [usize; 3],
+    dims: Option<[usize; 3]>,
     /// For making the field, and for rendering.
     seconds: [f64; 2],
 }
@@ -33,7 +33,7 @@ impl Output {
         rendered: RenderOutput,
         scene: Scene,
         input: Option<input::Report>,
-        dims: [usize; 3],
+        dims: Option<[usize; 3]>,
         seconds: [f64; 2],
     ) -> Output {
         Output { rendered, scene, input, dims, seconds }

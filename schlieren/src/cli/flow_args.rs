@@ -59,6 +59,9 @@ pub(super) struct FlowArgs {
     /// Two-dimensional data are half of an axisymmetric flow
     #[arg(long, conflicts_with = "span")]
     revolve: bool,
+    /// Trace light through the cells of the mesh themselves, without a lattice
+    #[arg(long)]
+    on_cells: bool,
     /// Nodes along the longest axis when data are resampled
     #[arg(long, value_name = "N")]
     resample: Option<usize>,
@@ -117,6 +120,7 @@ impl FlowArgs {
         f.length_unit_m = a.length_unit.unwrap_or(f.length_unit_m);
         f.span = a.span.or(f.span.filter(|_| !a.revolve));
         f.revolve = a.revolve || (f.revolve && a.span.is_none());
+        f.on_cells |= a.on_cells;
         f.resample_nodes = a.resample.or(f.resample_nodes);
         f.resample_samples = a.resample_samples.unwrap_or(f.resample_samples);
         f.reconstruction = a.reconstruction.unwrap_or(f.reconstruction);

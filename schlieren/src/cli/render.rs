@@ -157,11 +157,10 @@ pub(super) fn render_and_write(
     drop(bar);
     let render_secs = start.elapsed().as_secs_f64() - read_secs;
     if let Some(path) = outputs.reference {
-        let without = section.without_flow()?;
-        let still = std::mem::replace(&mut section.fields, without);
+        let flow = section.take_flow()?;
         let control = Control { cancel: cancel.flag(), ..Control::default() };
         let background = crate::render::render(scene, &section, Layers::NONE, &control);
-        section.fields = still;
+        (section.fields, section.cells) = flow;
         match background {
             Err(RenderError::Cancelled) => return Err(Interrupted.into()),
             other => output::write_png(path, &other?)?,
@@ -171,14 +170,14 @@ pub(super) fn render_and_write(
     for w in &rendered.report.warnings {
         common.warn(w);
     }
-    let field = &section.fields[0];
     let r = &rendered.report;
     let json = json!({
         "file": scene.flow.file,
         "technique": scene.technique.name(),
         "size": scene.film.size,
         "pixel_m": r.pixel_m,
-        "grid": field.dims(),
+        "grid": section.grid(),
+        "cells": cells_json(&section, &rendered),
         "n0_minus_1": section.input.as_ref().map(|i| i.reference_n_minus_1),
         "index_formula": section.input.as_ref().map(|i| i.formula),
         "march": r.march,
@@ -203,13 +202,34 @@ pub(super) fn render_and_write(
     let deflection = r
         .largest_deflection_rad
         .map_or(String::new(), |d| format!(", deflections up to {d:.3e} rad"));
+    let crossed = r.cells.map_or(String::new(), |c| {
+        format!(" through {:.0} cells each", c.cells_crossed as f64 / c.rays.max(1) as f64)
+    });
     let text = format!(
-        "{}: {}{deflection}; {} rays; read {read_secs:.2} s, render {render_secs:.2} s",
+        "{}: {}{deflection}; {} rays{crossed}; read {read_secs:.2} s, render {render_secs:.2} s",
         outputs.names(),
         described(scene),
         r.counters.rays + r.counters.map_rays,
     );
     Ok(RenderSummary { json, text })
+}
+
+/// The cells and the work on them; null on a lattice.
+fn cells_json(section: &TestSection, rendered: &RenderOutput) -> Value {
+    let Some(of) = section.input.as_ref().and_then(|i| i.cells.as_ref()) else {
+        return Value::Null;
+    };
+    json!({
+        "cells": of.cells,
+        "hidden": of.hidden,
+        "without_value": of.without_value,
+        "left_out": of.left_out,
+        "folded": of.folded,
+        "border_faces": of.border_faces,
+        "fitted_points": of.fit.fitted,
+        "limited_points": of.fit.limited,
+        "work": rendered.report.cells,
+    })
 }
 
 fn described(scene: &Scene) -> String {

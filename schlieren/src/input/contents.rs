@@ -167,7 +167,16 @@ pub fn contents_of_dataset(data: &Dataset) -> Contents {
         (high - low).to_array()
     };
     match Mesh::new(data) {
-        Ok(mesh) if mesh.num_cells() > 0 => c.size = Some(size_of(mesh)),
+        Ok(mesh) if mesh.num_cells() > 0 => {
+            if !matches!(data, Dataset::ImageData(_)) {
+                c.notes.push(format!(
+                    "light is traced through a lattice to which the mesh is resampled; --on-cells \
+                     traces it through the {} cells themselves",
+                    mesh.num_cells()
+                ));
+            }
+            c.size = Some(size_of(mesh));
+        }
         solid => match Mesh::with_plane(data, Plane::Extrude { span: 1.0 }) {
             Ok(plane) if plane.num_cells() > 0 => {
                 let [x, y, _] = size_of(plane);

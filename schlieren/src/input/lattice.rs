@@ -57,12 +57,18 @@ impl SamplePoints {
             let lattice = if per_point { lattice } else { cell_centres(lattice) };
             return Ok(SamplePoints::Uniform { lattice, backwards });
         }
-        let mesh = match options.depth {
-            Some(Depth::Span(span)) => Mesh::with_plane(data, Plane::Extrude { span })?,
-            Some(Depth::Revolve) => Mesh::with_plane(data, Plane::Extrude { span: sheet(data) })?,
-            None => Mesh::new(data)?,
-        };
-        Ok(SamplePoints::Mesh { mesh: Box::new(mesh), per_point, own: own.map(|o| o.0) })
+        let mesh = Box::new(mesh_of(data, options)?);
+        Ok(SamplePoints::Mesh { mesh, per_point, own: own.map(|o| o.0) })
+    }
+
+    /// The points or cells of the mesh that the data are, uniform ones too.
+    pub(super) fn on_cells(data: &Dataset, options: &Options) -> Result<SamplePoints, InputError> {
+        data.check().map_err(InputError::Model)?;
+        let mut per_point = false;
+        for name in options.medium.arrays() {
+            per_point |= ColorBy::find(data, name)?.per_point;
+        }
+        Ok(SamplePoints::Mesh { mesh: Box::new(mesh_of(data, options)?), per_point, own: None })
     }
 
     /// The values of an array, in the order of the points.
@@ -140,6 +146,15 @@ impl SamplePoints {
             }
         }
     }
+}
+
+/// The mesh of the data, with depth.
+fn mesh_of(data: &Dataset, options: &Options) -> Result<Mesh, InputError> {
+    Ok(match options.depth {
+        Some(Depth::Span(span)) => Mesh::with_plane(data, Plane::Extrude { span })?,
+        Some(Depth::Revolve) => Mesh::with_plane(data, Plane::Extrude { span: sheet(data) })?,
+        None => Mesh::new(data)?,
+    })
 }
 
 /// The lattice to resample to.

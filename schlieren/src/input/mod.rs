@@ -8,18 +8,23 @@
 //! The index is computed before resampling, at the points of the solver. A common background is
 //! subtracted in f64 before values are rounded, so a plume with differences of 1e-9 in n keeps its
 //! digits.
+//!
+//! [`load_cells`] makes [`crate::gas_on_cells::GasOnCells`] of the same values instead, without a
+//! lattice.
 
 mod contents;
 mod evaluate;
 mod lattice;
 mod media;
 mod medium;
+mod on_cells;
 mod reference;
 mod series;
 
 pub use contents::{Array, Contents, Guess, Meaning, contents, contents_of_dataset};
 pub use media::{load_media, media_from_dataset};
 pub use medium::{Medium, Quantity, Source};
+pub use on_cells::{cells_from_dataset, load_cells};
 pub use reference::Reference;
 pub use series::{Step, series};
 
@@ -172,6 +177,8 @@ pub struct Report {
     /// Report of the resampling; `None` for data that is already uniform. Its differences are in n
     /// − 1.
     pub resampling: Option<resample::Report>,
+    /// The cells, when light is traced through them ([`load_cells`]). Differences are in n − 1.
+    pub cells: Option<resample::CellReport>,
     /// Root mean square change of n − 1 by the smoothing.
     pub smoothing_rms: f64,
     /// Warnings for the user, one sentence each.
@@ -244,26 +251,14 @@ fn with_data<T>(
 /// # Ok::<(), schlieren::input::InputError>(())
 /// ```
 pub fn from_dataset(data: &Dataset, options: &Options) -> Result<LoadedField, InputError> {
-    if !(options.length_unit_m > 0.0 && options.length_unit_m.is_finite()) {
-        return Err(InputError::Option {
-            what: format!("length unit {} m", options.length_unit_m),
-            cure: "give metres per unit of the file, such as 0.001 for mm",
-        });
-    }
+    check_length_unit(options)?;
     let mut report = Report::default();
 
     // n − 1 at the points of the file, less a common background.
     let points = lattice::SamplePoints::find(data, options)?;
     let columns = options.medium.columns(data, &points)?;
     let mut index = evaluate::evaluate(&columns, options, &mut report)?;
-    let background = reference::median(&index);
-    if !background.is_finite() {
-        return Err(InputError::Option {
-            what: format!("no value of {} gives an index", options.medium.describe()),
-            cure: "check that the arrays hold finite numbers in SI units",
-        });
-    }
-    index.iter_mut().for_each(|n| *n -= background);
+    let background = reference::background(&mut index, options)?;
 
     // Resample to a uniform lattice.
     let mut on = points.to_lattice(index, options)?;
@@ -281,10 +276,7 @@ pub fn from_dataset(data: &Dataset, options: &Options) -> Result<LoadedField, In
     let inside = on.values.iter().zip(&on.marks).filter(|(_, m)| **m == Mark::Inside);
     let largest = inside.map(|(d, _)| f64::from(*d) + background).fold(0.0, f64::max);
     if largest > MOST_N_MINUS_1 {
-        return Err(InputError::Option {
-            what: format!("n - 1 is up to {largest:.3e}, and no medium has that"),
-            cure: "check the units of the arrays",
-        });
+        return Err(impossible_index(largest));
     }
 
     // eps = n/n0 − 1 = (d − d0)/n0, where d is n − 1 less the background.
@@ -299,6 +291,23 @@ pub fn from_dataset(data: &Dataset, options: &Options) -> Result<LoadedField, In
     let eps = reference::continued(eps, lattice.dims, &on.marks, options);
     let field = Field::new(lattice.dims, spacing_m, lattice.origin * unit, eps, n0, nodes)?;
     Ok(LoadedField { field, report })
+}
+
+fn check_length_unit(options: &Options) -> Result<(), InputError> {
+    if options.length_unit_m > 0.0 && options.length_unit_m.is_finite() {
+        return Ok(());
+    }
+    Err(InputError::Option {
+        what: format!("length unit {} m", options.length_unit_m),
+        cure: "give metres per unit of the file, such as 0.001 for mm",
+    })
+}
+
+fn impossible_index(largest: f64) -> InputError {
+    InputError::Option {
+        what: format!("n - 1 is up to {largest:.3e}, and no medium has that"),
+        cure: "check the units of the arrays",
+    }
 }
 
 /// The kinds of the nodes; `None` if all are gas.

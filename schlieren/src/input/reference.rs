@@ -28,6 +28,30 @@ pub(super) fn median(values: &[f64]) -> f64 {
     median_high(&mut finite).unwrap_or(f64::NAN)
 }
 
+/// Subtracts the median from the values, and returns it.
+pub(super) fn background(index: &mut [f64], options: &Options) -> Result<f64, InputError> {
+    let background = median(index);
+    if !background.is_finite() {
+        return Err(InputError::Option {
+            what: format!("no value of {} gives an index", options.medium.describe()),
+            cure: "check that the arrays hold finite numbers in SI units",
+        });
+    }
+    index.iter_mut().for_each(|n| *n -= background);
+    Ok(background)
+}
+
+/// A given n0 − 1, if a medium can have it.
+pub(super) fn given(n_minus_1: f64) -> Result<f64, InputError> {
+    if n_minus_1.is_finite() && n_minus_1 > -1.0 {
+        return Ok(n_minus_1);
+    }
+    Err(InputError::Option {
+        what: format!("reference n - 1 is {n_minus_1}"),
+        cure: "give n0 - 1, about 2.7e-4 for air",
+    })
+}
+
 impl Reference {
     /// The reference, relative to the background that was subtracted from the values.
     pub(super) fn choose(
@@ -42,13 +66,7 @@ impl Reference {
         };
         let all = |_: usize| true;
         match self {
-            Reference::Given { n_minus_1 } if n_minus_1.is_finite() && *n_minus_1 > -1.0 => {
-                Ok(n_minus_1 - background)
-            }
-            Reference::Given { n_minus_1 } => Err(InputError::Option {
-                what: format!("reference n - 1 is {n_minus_1}"),
-                cure: "give n0 - 1, about 2.7e-4 for air",
-            }),
+            Reference::Given { n_minus_1 } => Ok(given(*n_minus_1)? - background),
             Reference::Median => Ok(or_zero(median(&gas(&all)))),
             Reference::Border => {
                 let [nx, ny, nz] = on.lattice.dims;

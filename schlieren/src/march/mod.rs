@@ -7,6 +7,7 @@
 //! | [`Deviational`] (Verlet) | gases: the default | one sample per step, `f32`, 16 rays at once |
 //! | [`Deviational`] (Euler) | comparison with the dissertation (equations 5.7, 5.8) | the same |
 //! | [`Full`] | lenses, liquids, turning rays | one to six samples per step, `f64` |
+//! | [`OnCells`] (Verlet) | meshes without a lattice | one sample per cell or more, `f64` |
 //!
 //! Two more integrators are references for measuring the errors of these. [`DormandPrince`] is
 //! adaptive and serves smooth media. [`CellExact`] ends its steps on the faces of cells and serves
@@ -22,6 +23,7 @@ mod full;
 mod integrator;
 mod kernel_ray;
 mod line_of_sight;
+mod on_cells;
 mod packet;
 mod pefrl;
 mod rk4;
@@ -41,6 +43,8 @@ pub use integrator::{Integrator, InterpolatedMedium, Medium, Ray};
 pub(crate) use kernel_ray::KernelOutput;
 pub(crate) use kernel_ray::KernelRay;
 pub use line_of_sight::LineOfSight;
+pub(crate) use on_cells::CellWork;
+pub use on_cells::{CellCounters, OnCells};
 pub use pefrl::Pefrl;
 pub use rk4::RungeKutta4;
 pub use sharma::Sharma;

@@ -63,7 +63,7 @@ pub(super) fn expose_lines<'a>(
     let mut first = None;
 
     for line in 0..lines.len() {
-        let n0 = section.fields[line].n0();
+        let n0 = section.n0(line);
         let t = technique(scene, line, &framing, n0, tilted_beams)?;
         let planned = section.paths(
             scene,
@@ -124,6 +124,7 @@ pub(super) fn expose_lines<'a>(
         counters.tilted_rays += if tilted_beams { rays } else { 0 };
         counters.dispersion_rays += if line > 0 { rays } else { 0 };
         counters.media_rays += planned.take_media_rays();
+        r.report.add_cells(&planned);
         first.get_or_insert(planned);
     }
     Ok(first)

@@ -163,7 +163,7 @@ pub(super) fn add_emission(
     let colors = film_colors(&lines);
     let mut gain = [0.0f32; 3];
     for line in 0..lines.len() {
-        let t: Technique = technique(scene, line, &r.framing, section.fields[line].n0(), false)?;
+        let t: Technique = technique(scene, line, &r.framing, section.n0(line), false)?;
         let passes = t.passes_evenly(scene.media.stop_m());
         let color = if lines.len() > 1 { colors[line] } else { [1.0; 3] };
         (0..3).for_each(|c| gain[c] += passes[c] * color[c]);

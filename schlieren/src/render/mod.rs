@@ -27,6 +27,7 @@ pub(crate) mod map;
 mod media;
 #[cfg(test)]
 mod media_tests;
+mod on_cells;
 mod on_gpu;
 mod paths;
 mod planned;
@@ -43,6 +44,7 @@ pub use section::TestSection;
 
 use crate::cutoff::Rgb;
 use crate::film::{Framing, Tally};
+use crate::march::CellCounters;
 use crate::path::{LightPaths, PathQuantities, SkipReport, Start};
 use crate::scene::{Counters, Effects, Scene, SceneError, TechniqueSpec};
 use crate::spectrum::filter_band;
@@ -204,6 +206,9 @@ pub struct Report {
     /// on the map for techniques without light.
     #[serde(rename = "left_out")]
     pub skip_report: Option<SkipReport>,
+    /// The work on the cells of a mesh, for the first wavelength and the map; `None` on a lattice.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cells: Option<CellCounters>,
     /// Lowest and highest channel value of the image.
     pub levels: [f32; 2],
     /// Width of the margin around the image, in pixels, that also sent light.
@@ -219,6 +224,13 @@ impl Report {
     fn add_traced(&mut self, paths: &dyn LightPaths) {
         let new = paths.device_warning().filter(|t| !self.warnings.contains(t));
         self.warnings.extend(new);
+    }
+
+    /// Notes the work of paths on cells.
+    fn add_cells(&mut self, planned: &PlannedPaths<'_>) {
+        if let (None, Some(work)) = (self.cells, &planned.cell_work) {
+            self.cells = Some(work.counters());
+        }
     }
 
     fn add_plan(&mut self, planned: &PlannedPaths<'_>) {
@@ -375,7 +387,7 @@ pub fn technique(
 fn add_map(scene: &Scene, section: &TestSection, planned: &PlannedPaths<'_>, r: &mut RenderOutput) {
     let blocked = |s: &Start| section.solids.as_ref().is_some_and(|b| b.block(&section.view, s));
     let wavelength_m = scene.light.wavelengths_nm[0] * 1e-9;
-    let n0 = section.fields[0].n0();
+    let n0 = section.n0(0);
     let mut m = map::map(&*planned.paths, &scene.optics(), &r.framing, wavelength_m, n0, blocked);
     if matches!(scene.technique, TechniqueSpec::Bos { .. }) {
         m.apparent_m = apparent::displacements(&r.framing, &m.displacement_m, &m.transmission);
@@ -384,6 +396,7 @@ fn add_map(scene: &Scene, section: &TestSection, planned: &PlannedPaths<'_>, r: 
     if report.march.is_empty() {
         report.add_plan(planned);
     }
+    report.add_cells(planned);
     report.skip_report = report.skip_report.or(planned.paths.skip_report());
     report.add_traced(&*planned.paths);
     report.counters.map_rays += m.transmission.len() as u64;

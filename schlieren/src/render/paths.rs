@@ -2,6 +2,7 @@
 //! tolerance what the scene leaves open, and measures the error. Marches for comparison, which no
 //! plan chooses, are made here.
 
+use super::on_cells;
 use super::on_gpu::on_gpu;
 use super::planned::{PlannedPaths, described};
 use super::{RenderError, TestSection};
@@ -14,7 +15,7 @@ use crate::march::{
 use crate::media::Bend;
 use crate::path::{Exit, LightPaths, PathQuantities, Start};
 use crate::plan::{Mode, Plan, Request};
-use crate::scene::Scene;
+use crate::scene::{Device, Scene};
 use crate::technique::bos::ReversedPaths;
 use crate::view::View;
 
@@ -47,6 +48,17 @@ impl TestSection {
         measure: bool,
     ) -> Result<PlannedPaths<'_>, RenderError> {
         let march = &scene.march;
+        let view = if against_light { ReversedPaths::view(&self.view) } else { self.view };
+        if let Some(gas) = self.cells.get(line) {
+            let rays = measure.then_some(MEASURED_RAYS);
+            let mut planned = on_cells::planned(gas, view, quantities, march.tolerance_rad, rays);
+            if march.device == Device::Auto {
+                planned.warnings.push(
+                    "computed on the CPU: the GPU traces light on lattices, not on cells".into(),
+                );
+            }
+            return Ok(planned.in_image_frame(against_light));
+        }
         let known = |name: &Option<String>, names: &[&'static str], key| match name {
             None => Ok(None),
             Some(n) => match names.iter().find(|k| **k == n.as_str()) {
@@ -64,7 +76,6 @@ impl TestSection {
         let field = &self.fields[line];
         let temporary = FieldCache::default();
         let cache = self.caches.get(line).unwrap_or(&temporary);
-        let view = if against_light { ReversedPaths::view(&self.view) } else { self.view };
         let with = |mode| Request {
             tolerance_rad: march.tolerance_rad,
             direction: Some(view.forward),

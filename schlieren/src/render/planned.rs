@@ -1,5 +1,6 @@
 //! Light paths with their description and measured accuracy.
 use crate::interpolate::Interpolant;
+use crate::march::CellWork;
 use crate::media::Bend;
 use crate::path::LightPaths;
 use crate::plan::MeasuredError;
@@ -25,6 +26,8 @@ pub struct PlannedPaths<'a> {
     pub(super) step_voxels: f64,
     /// Number of rays along which media were integrated.
     pub(super) media_rays: Arc<AtomicU64>,
+    /// The work on the cells of a mesh; `None` on a lattice.
+    pub(super) cell_work: Option<Arc<CellWork>>,
 }
 
 impl<'a> PlannedPaths<'a> {
@@ -45,6 +48,7 @@ impl<'a> PlannedPaths<'a> {
             bend,
             step_voxels,
             media_rays: Arc::default(),
+            cell_work: None,
         }
     }
 

@@ -3,6 +3,7 @@
 
 use super::RenderError;
 use crate::field::Field;
+use crate::gas_on_cells::GasOnCells;
 use crate::input;
 use crate::march::FieldCache;
 use crate::media::Media;
@@ -10,11 +11,16 @@ use crate::scene::Scene;
 use crate::solids::Solids;
 use crate::view::View;
 use datasets::model::Dataset;
+use glam::DVec3;
 
 /// The contents of the test section, between the lenses.
 pub struct TestSection {
-    /// The gas for the light of each wavelength, in the scene's order.
+    /// The gas for the light of each wavelength, in the scene's order; empty when light is traced
+    /// through the cells of a mesh.
     pub fields: Vec<Field>,
+    /// The gas on the cells of a mesh for the light of each wavelength; empty when light is traced
+    /// through a lattice.
+    pub cells: Vec<GasOnCells>,
     /// The view, centred on the fields' middle.
     pub view: View,
     /// Bodies.
@@ -29,6 +35,11 @@ pub struct TestSection {
     pub(super) caches: Vec<FieldCache>,
 }
 
+/// Refuses scenes that need a lattice and have none, before anything looks for it.
+fn refuse_lattice_keys(scene: &Scene) -> Result<(), RenderError> {
+    if scene.flow.on_cells { Ok(scene.check()?) } else { Ok(()) }
+}
+
 impl TestSection {
     /// Reads the files that the scene names. `read` is called with a description before each is
     /// read.
@@ -36,13 +47,22 @@ impl TestSection {
     /// # Errors
     /// If a file cannot be read, or does not define a field for each wavelength.
     pub fn open(scene: &Scene, mut read: impl FnMut(&str)) -> Result<TestSection, RenderError> {
-        let mut fields = Vec::new();
+        refuse_lattice_keys(scene)?;
+        let (mut fields, mut cells) = (Vec::new(), Vec::new());
         let mut report: Option<input::Report> = None;
         for line in scene.lines() {
-            read(&format!("reading {} for {} nm", scene.flow.file.display(), line.wavelength_nm));
-            let loaded = input::load(&scene.flow.file, &scene.flow.options(line.wavelength_nm)?)?;
-            fields.push(loaded.field);
-            report.get_or_insert(loaded.report);
+            let file = &scene.flow.file;
+            read(&format!("reading {} for {} nm", file.display(), line.wavelength_nm));
+            let options = scene.flow.options(line.wavelength_nm)?;
+            if scene.flow.on_cells {
+                let (gas, of_cells) = input::load_cells(file, &options)?;
+                cells.push(gas);
+                report.get_or_insert(of_cells);
+            } else {
+                let loaded = input::load(file, &options)?;
+                fields.push(loaded.field);
+                report.get_or_insert(loaded.report);
+            }
         }
         let mut warnings = report.as_ref().map_or(Vec::new(), |r| r.warnings.clone());
         let mut solids = None;
@@ -52,7 +72,7 @@ impl TestSection {
             warnings.extend(more);
             solids = Some(bodies);
         }
-        let mut section = TestSection::of_fields(scene, fields, solids)?;
+        let mut section = TestSection::of_gas(scene, fields, cells, solids)?;
         (section.input, section.warnings) = (report, warnings);
         if !scene.media.is_empty() {
             read("reading absorption, emission or rotation");
@@ -75,21 +95,40 @@ impl TestSection {
         data: &Dataset,
         solids: Option<Solids>,
     ) -> Result<TestSection, RenderError> {
-        let (mut fields, mut report) = (Vec::new(), None::<input::Report>);
-        for line in scene.lines() {
-            let loaded = input::from_dataset(data, &scene.flow.options(line.wavelength_nm)?)?;
-            fields.push(loaded.field);
-            report.get_or_insert(loaded.report);
-        }
-        let mut section = TestSection::of_fields(scene, fields, solids)?;
-        section.warnings = report.as_ref().map_or(Vec::new(), |r| r.warnings.clone());
-        section.input = report;
+        let mut section = TestSection::of_gas_in(scene, data, solids)?;
         if !scene.media.is_empty() {
             let options = scene.flow.options(scene.light.wavelengths_nm[0])?;
             let quantities = scene.media.quantities();
             let media = input::media_from_dataset(data, &options, &quantities, &section.fields[0])?;
             section = section.with_media(media);
         }
+        Ok(section)
+    }
+
+    /// The gas of a data set in memory, without its media.
+    pub(crate) fn of_gas_in(
+        scene: &Scene,
+        data: &Dataset,
+        solids: Option<Solids>,
+    ) -> Result<TestSection, RenderError> {
+        refuse_lattice_keys(scene)?;
+        let (mut fields, mut cells) = (Vec::new(), Vec::new());
+        let mut report = None::<input::Report>;
+        for line in scene.lines() {
+            let options = scene.flow.options(line.wavelength_nm)?;
+            if scene.flow.on_cells {
+                let (gas, of_cells) = input::cells_from_dataset(data, &options)?;
+                cells.push(gas);
+                report.get_or_insert(of_cells);
+            } else {
+                let loaded = input::from_dataset(data, &options)?;
+                fields.push(loaded.field);
+                report.get_or_insert(loaded.report);
+            }
+        }
+        let mut section = TestSection::of_gas(scene, fields, cells, solids)?;
+        section.warnings = report.as_ref().map_or(Vec::new(), |r| r.warnings.clone());
+        section.input = report;
         Ok(section)
     }
 
@@ -102,13 +141,36 @@ impl TestSection {
         fields: Vec<Field>,
         solids: Option<Solids>,
     ) -> Result<TestSection, RenderError> {
-        let lines = scene.light.wavelengths_nm.len();
-        let (Some(first), true) = (fields.first(), fields.len() == lines) else {
-            return Err(RenderError::Fields { wanted: lines, found: fields.len() });
+        TestSection::of_gas(scene, fields, Vec::new(), solids)
+    }
+
+    /// A test section of gas on the cells of meshes, one for each wavelength of the scene.
+    ///
+    /// # Errors
+    /// As [`TestSection::of_fields`].
+    pub fn of_cells(
+        scene: &Scene,
+        cells: Vec<GasOnCells>,
+        solids: Option<Solids>,
+    ) -> Result<TestSection, RenderError> {
+        TestSection::of_gas(scene, Vec::new(), cells, solids)
+    }
+
+    fn of_gas(
+        scene: &Scene,
+        fields: Vec<Field>,
+        cells: Vec<GasOnCells>,
+        solids: Option<Solids>,
+    ) -> Result<TestSection, RenderError> {
+        let (wanted, found) = (scene.light.wavelengths_nm.len(), fields.len().max(cells.len()));
+        let of_cells = cells.first().map(GasOnCells::centre_m);
+        let centre_m = fields.first().map(Field::centre_m).or(of_cells);
+        let (Some(centre_m), true) = (centre_m, found == wanted) else {
+            return Err(RenderError::Fields { wanted, found });
         };
-        let view = scene.view.direction.view(first.centre_m())?;
+        let view = scene.view.direction.view(centre_m)?;
         let (input, warnings, caches) = (None, Vec::new(), Vec::new());
-        Ok(TestSection { fields, view, solids, media: None, input, warnings, caches })
+        Ok(TestSection { fields, cells, view, solids, media: None, input, warnings, caches })
     }
 
     /// Keeps what marches compute from the fields (splines, projections) for further images. This
@@ -118,6 +180,38 @@ impl TestSection {
     pub fn with_caches(mut self) -> TestSection {
         self.caches = self.fields.iter().map(|_| FieldCache::default()).collect();
         self
+    }
+
+    /// Index of the reference medium for a line of the spectrum.
+    pub fn n0(&self, line: usize) -> f64 {
+        self.cells.get(line).map_or_else(|| self.fields[line].n0(), GasOnCells::n0)
+    }
+
+    /// Centre of the gas: of its lattice, or of the box of its mesh.
+    pub fn centre_m(&self) -> DVec3 {
+        self.cells.first().map_or_else(|| self.fields[0].centre_m(), GasOnCells::centre_m)
+    }
+
+    /// Size of the gas: of its lattice, or of the box of its mesh.
+    pub fn size_m(&self) -> DVec3 {
+        self.cells.first().map_or_else(|| self.fields[0].size_m(), GasOnCells::size_m)
+    }
+
+    /// Nodes of the lattice; `None` for the cells of a mesh.
+    pub fn grid(&self) -> Option<[usize; 3]> {
+        self.fields.first().map(Field::dims)
+    }
+
+    /// Replaces the gas by the same gas at rest, with the same bodies and blank places, and returns
+    /// it.
+    ///
+    /// # Errors
+    /// If a field cannot be made, which the fields themselves rule out.
+    pub fn take_flow(&mut self) -> Result<(Vec<Field>, Vec<GasOnCells>), RenderError> {
+        let fields = self.without_flow()?;
+        let cells = self.cells.iter().map(GasOnCells::at_rest).collect();
+        let flow = std::mem::replace(&mut self.fields, fields);
+        Ok((flow, std::mem::replace(&mut self.cells, cells)))
     }
 
     /// The fields of the same gas at rest everywhere, with the same bodies and blank places.
@@ -135,12 +229,12 @@ impl TestSection {
 
     /// Extent of the field along the view's right and up, in metres.
     pub fn sides_m(&self) -> [f64; 2] {
-        let size = self.fields[0].size_m();
+        let size = self.size_m();
         [self.view.right, self.view.up].map(|axis| axis.abs().dot(size))
     }
 
     /// Depth of the field along the light, in metres.
     pub fn depth_m(&self) -> f64 {
-        self.view.forward.abs().dot(self.fields[0].size_m())
+        self.view.forward.abs().dot(self.size_m())
     }
 }

@@ -49,6 +49,7 @@ impl Scene {
         positive("march.tolerance_rad", self.march.tolerance_rad)?;
         self.march.step_voxels.map_or(Ok(()), |s| positive("march.step_voxels", s))?;
         self.check_skip()?;
+        self.check_on_cells()?;
         self.check_effect()?;
         self.check_media()
     }

@@ -76,7 +76,11 @@ pub struct FlowSpec {
     /// to be resampled; 1 takes the value at the node.
     #[serde(default = "one_sample")]
     pub resample_samples: usize,
-    /// How values between the points of a mesh are computed when the data have to be resampled.
+    /// Whether light is traced through the cells of the mesh themselves, without a lattice.
+    #[serde(default)]
+    pub on_cells: bool,
+    /// How values between the points of a mesh are computed when the data have to be resampled, or
+    /// light is traced through cells.
     #[serde(default)]
     pub reconstruction: Reconstruction,
     /// Standard deviation of the smoothing of shocks, in nodes; 0 for none.
@@ -151,6 +155,7 @@ impl Default for FlowSpec {
             revolve: false,
             resample_nodes: None,
             resample_samples: one_sample(),
+            on_cells: false,
             reconstruction: Reconstruction::default(),
             smoothing_nodes: 0.0,
             outside: None,
@@ -177,6 +182,7 @@ impl FlowSpec {
             revolve: self.revolve,
             resample_nodes: self.resample_nodes,
             resample_samples: self.resample_samples,
+            on_cells: self.on_cells,
             reconstruction: self.reconstruction,
             smoothing_nodes: self.smoothing_nodes,
             outside: self.outside,

@@ -30,6 +30,7 @@ mod direction;
 mod effects;
 mod flow;
 mod media;
+mod on_cells;
 mod technique;
 
 pub use direction::Direction;

@@ -2,7 +2,7 @@
 //! functions change.
 
 use crate::field::{Field, Node};
-use crate::input::{InputError, from_dataset};
+use crate::input::{InputError, cells_from_dataset, from_dataset};
 use crate::render::{RenderError, TestSection};
 use crate::scene::Scene;
 use crate::solids::Solids;
@@ -64,9 +64,16 @@ impl Flow {
     /// relative.
     pub(super) fn reference_n_minus_1(&self, scene: &Scene) -> Result<f64, RenderError> {
         let options = scene.flow.options(scene.light.wavelengths_nm[0])?;
-        let loaded = from_dataset(&self.data, &options)
-            .map_err(|e| InputError::InFile { path: self.file.clone(), source: Box::new(e) })?;
-        Ok(loaded.report.reference_n_minus_1)
+        let report = if scene.flow.on_cells {
+            cells_from_dataset(&self.data, &options).map(|loaded| loaded.1)
+        } else {
+            from_dataset(&self.data, &options).map(|loaded| loaded.report)
+        };
+        Ok(report.map_err(|e| self.in_file(e))?.reference_n_minus_1)
+    }
+
+    fn in_file(&self, error: InputError) -> InputError {
+        InputError::InFile { path: self.file.clone(), source: Box::new(error) }
     }
 
     /// The test section for a scene. `solids` are those of the previous test section, because a
@@ -76,19 +83,13 @@ impl Flow {
         scene: &Scene,
         solids: Option<Solids>,
     ) -> Result<TestSection, RenderError> {
-        let mut fields = Vec::new();
-        let mut report = None;
-        for line in scene.lines() {
-            let options = scene.flow.options(line.wavelength_nm)?;
-            let loaded = from_dataset(&self.data, &options)
-                .map_err(|e| InputError::InFile { path: self.file.clone(), source: Box::new(e) })?;
-            fields.push(loaded.field);
-            report.get_or_insert(loaded.report);
-        }
-        let mut section = TestSection::of_fields(scene, fields, solids)?;
-        section.warnings = self.warnings.clone();
-        section.warnings.extend(report.iter().flat_map(|r| r.warnings.iter().cloned()));
-        section.input = report;
+        let of_input = |e: RenderError| match e {
+            RenderError::Input(e) => RenderError::Input(self.in_file(e)),
+            other => other,
+        };
+        let made = TestSection::of_gas_in(scene, &self.data, solids);
+        let mut section = made.map_err(of_input)?;
+        section.warnings.splice(0..0, self.warnings.iter().cloned());
         Ok(section)
     }
 }

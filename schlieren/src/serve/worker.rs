@@ -256,8 +256,11 @@ impl Worker {
             of_series.flow.reference_n_minus_1 = self.reference_n_minus_1(scene)?;
             // Bodies stay in `self.solids` until nothing can fail any more.
             let mut full = self.flow.section(&of_series, None)?.with_caches();
-            let coarse_fields: Option<Vec<_>> =
-                full.fields.iter().map(super::flow::coarse).collect();
+            // Cells of a mesh have no coarse lattice.
+            let coarse_fields: Option<Vec<_>> = match full.fields.is_empty() {
+                true => None,
+                false => full.fields.iter().map(super::flow::coarse).collect(),
+            };
             let coarse = match coarse_fields {
                 Some(fields) => Some(TestSection::of_fields(scene, fields, None)?.with_caches()),
                 None => None,
@@ -267,7 +270,7 @@ impl Worker {
             self.section = Some(Section { flow, wavelengths_nm, full, coarse });
         }
         if let Some(s) = &mut self.section {
-            let view = scene.view.direction.view(s.full.fields[0].centre_m())?;
+            let view = scene.view.direction.view(s.full.centre_m())?;
             s.full.view = view;
             if let Some(coarse) = &mut s.coarse {
                 coarse.view = view;
@@ -344,7 +347,7 @@ impl Worker {
                 section.solids.as_ref().is_some_and(|b| b.block(&section.view, s))
             };
             let wavelength_m = scene.light.wavelengths_nm[0] * 1e-9;
-            let n0 = section.fields[0].n0();
+            let n0 = section.n0(0);
             let map: Map = render::map::map(
                 &*planned.paths,
                 &scene.optics(),

@@ -48,7 +48,7 @@ pub(super) enum State {
 /// A polynomial in a frame of its own, in which the neighbours have the same spread along all axes:
 /// in stretched cells, a polynomial in lengths would have coefficients whose sum loses all digits.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Expansion {
+pub(in crate::resample) struct Expansion {
     /// Lower triangle of the matrix from distances to the frame: xx, yx, yy, zx, zy, zz.
     frame: [f32; 6],
     /// What is added to the point's value, and the coefficients of the monomials.
@@ -58,6 +58,14 @@ pub(super) struct Expansion {
     low: f32,
     high: f32,
     state: State,
+}
+
+/// The numbers of a polynomial, as in [`Expansion`].
+pub(in crate::resample) struct Parts {
+    pub(in crate::resample) frame: [f32; 6],
+    pub(in crate::resample) constant: f32,
+    pub(in crate::resample) terms: [f32; TERMS],
+    pub(in crate::resample) bounds: [f32; 2],
 }
 
 impl Expansion {
@@ -70,6 +78,16 @@ impl Expansion {
             low: 0.0,
             high: 0.0,
             state,
+        }
+    }
+
+    /// The numbers of the polynomial.
+    pub(in crate::resample) fn parts(&self) -> Parts {
+        Parts {
+            frame: self.frame,
+            constant: self.constant,
+            terms: self.terms,
+            bounds: [self.low, self.high],
         }
     }
 

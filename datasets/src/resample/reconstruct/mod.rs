@@ -21,9 +21,13 @@ mod least_squares;
 mod neighbours;
 mod polynomial;
 
+pub(super) use expansion::Expansion;
+pub(super) use neighbours::first_at_place;
+pub(super) use polynomial::TERMS;
+
 use super::mesh::Mesh;
 use cell_moments::CellMoments;
-use expansion::{Expansion, Fit};
+use expansion::Fit;
 use glam::DVec3;
 use neighbours::{Incidence, Neighbourhood};
 use rayon::prelude::*;
@@ -103,6 +107,11 @@ impl<'a> PointField<'a> {
             fit.over_cells(mesh, cells, &moments, values[point], point, around)
         };
         PointField { values, expansions: fitted(mesh, fit) }
+    }
+
+    /// The polynomials alone.
+    pub(super) fn into_expansions(self) -> Vec<Expansion> {
+        self.expansions
     }
 
     /// The value at `p` in the cell with these corners, from the weights of its element.

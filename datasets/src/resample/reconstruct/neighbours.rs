@@ -26,18 +26,22 @@ impl Rows {
     }
 }
 
+/// For each point the first of those at the same place.
+pub(in crate::resample) fn first_at_place(mesh: &Mesh) -> Vec<u32> {
+    let mut first: HashMap<[u64; 3], u32> = HashMap::with_capacity(mesh.num_points());
+    (0..mesh.num_points())
+        .map(|i| {
+            // Adding zero makes -0 the same place as 0.
+            let place = mesh.point(i).to_array().map(|x| (x + 0.0).to_bits());
+            *first.entry(place).or_insert(i as u32)
+        })
+        .collect()
+}
+
 impl Incidence {
     /// Hidden cells are left out: their values are not those of the flow.
     pub(super) fn of(mesh: &Mesh) -> Incidence {
-        let mut first: HashMap<[u64; 3], u32> = HashMap::with_capacity(mesh.num_points());
-        let same: Vec<u32> = (0..mesh.num_points())
-            .map(|i| {
-                // Adding zero makes -0 the same place as 0.
-                let place = mesh.point(i).to_array().map(|x| (x + 0.0).to_bits());
-                *first.entry(place).or_insert(i as u32)
-            })
-            .collect();
-        drop(first);
+        let same = first_at_place(mesh);
         let of_cell = |cell: usize| {
             let ids = if mesh.is_hidden(cell) { vec![] } else { mesh.corners(cell).ids };
             ids.into_iter().map(|id| same[id as usize]).collect::<Vec<u32>>()

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 /// Number of monomials of degree 1 to 3; the constant is apart.
-pub(super) const TERMS: usize = 19;
+pub(in crate::resample) const TERMS: usize = 19;
 
 /// Number of monomials of degree 1 to the given one.
 pub(super) const TERMS_TO_DEGREE: [usize; 4] = [0, 3, 9, 19];

@@ -1,0 +1,177 @@
+//! The mean of the corners' polynomials, weighted by their shares, and its gradient, for four
+//! corners at once: a tetrahedron's, or half of a hexahedron's.
+//!
+//! Coefficients are f32 in memory already. Values are taken relative to the first corner's, and
+//! places to its place, so that f32 keeps the digits of differences.
+
+use crate::resample::reconstruct::{Expansion, TERMS};
+use glam::DVec3;
+
+/// Corners that are evaluated at once.
+pub(super) const LANES: usize = 4;
+
+type Lane = [f32; LANES];
+const ZERO: Lane = [0.0; LANES];
+
+/// Shares of four corners and their gradients.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Share {
+    n: Lane,
+    gradient: [Lane; 3],
+}
+
+impl Share {
+    pub(super) const NONE: Share = Share { n: ZERO, gradient: [ZERO; 3] };
+}
+
+/// Sets the share of corner `i` and its gradient.
+pub(super) fn set(shares: &mut [Share], i: usize, n: f64, gradient: DVec3) {
+    let (share, lane) = (&mut shares[i / LANES], i % LANES);
+    share.n[lane] = n as f32;
+    for a in 0..3 {
+        share.gradient[a][lane] = gradient[a] as f32;
+    }
+}
+
+/// What a corner contributes.
+pub(super) struct Corner<'a> {
+    /// Relative to the cell's origin.
+    pub(super) place: DVec3,
+    pub(super) value: f64,
+    /// None for linear reconstruction.
+    pub(super) expansion: Option<&'a Expansion>,
+}
+
+/// The polynomials of a cell's corners.
+#[derive(Default)]
+pub(super) struct Polynomials {
+    groups: Vec<Group>,
+    /// The first corner's value.
+    value: f64,
+    linear: bool,
+}
+
+/// Those of four corners: a lane for each.
+#[derive(Clone)]
+struct Group {
+    place: [Lane; 3],
+    value: Lane,
+    frame: [Lane; 6],
+    constant: Lane,
+    terms: [Lane; TERMS],
+    low: Lane,
+    high: Lane,
+}
+
+const EMPTY: Group = Group {
+    place: [ZERO; 3],
+    value: ZERO,
+    frame: [ZERO; 6],
+    constant: ZERO,
+    terms: [ZERO; TERMS],
+    low: ZERO,
+    high: ZERO,
+};
+
+impl Polynomials {
+    pub(super) fn prepare<'a>(&mut self, corners: impl ExactSizeIterator<Item = Corner<'a>>) {
+        self.groups.clear();
+        self.groups.resize(corners.len().div_ceil(LANES), EMPTY);
+        self.linear = true;
+        for (i, corner) in corners.enumerate() {
+            if i == 0 {
+                self.value = corner.value;
+            }
+            let (group, l) = (&mut self.groups[i / LANES], i % LANES);
+            for a in 0..3 {
+                group.place[a][l] = corner.place[a] as f32;
+            }
+            group.value[l] = (corner.value - self.value) as f32;
+            let Some(expansion) = corner.expansion else { continue };
+            self.linear = false;
+            let parts = expansion.parts();
+            for (lane, f) in group.frame.iter_mut().zip(parts.frame) {
+                lane[l] = f;
+            }
+            for (lane, c) in group.terms.iter_mut().zip(parts.terms) {
+                lane[l] = c;
+            }
+            group.constant[l] = parts.constant;
+            [group.low[l], group.high[l]] = parts.bounds;
+        }
+    }
+
+    /// The value and its gradient at `at`, relative to the cell's origin.
+    pub(super) fn blend(&self, at: DVec3, shares: &[Share]) -> (f64, DVec3) {
+        let at = at.to_array().map(|x| x as f32);
+        let mut sum = [0.0f64; 4];
+        for (group, share) in self.groups.iter().zip(shares) {
+            let lanes = if self.linear { group.linear(share) } else { group.cubic(at, share) };
+            for (s, lane) in sum.iter_mut().zip(lanes) {
+                *s += f64::from(total(lane));
+            }
+        }
+        (self.value + sum[0], DVec3::new(sum[1], sum[2], sum[3]))
+    }
+}
+
+fn total(l: Lane) -> f32 {
+    (l[0] + l[2]) + (l[1] + l[3])
+}
+
+impl Group {
+    fn linear(&self, share: &Share) -> [Lane; 4] {
+        let mut out = [ZERO; 4];
+        for l in 0..LANES {
+            out[0][l] = share.n[l] * self.value[l];
+            for a in 0..3 {
+                out[a + 1][l] = share.gradient[a][l] * self.value[l];
+            }
+        }
+        out
+    }
+
+    /// Terms in the order of `polynomial::monomials`.
+    #[inline]
+    fn cubic(&self, at: [f32; 3], share: &Share) -> [Lane; 4] {
+        let (f, c) = (&self.frame, &self.terms);
+        let mut out = [ZERO; 4];
+        for l in 0..LANES {
+            let d = [0, 1, 2].map(|a| at[a] - self.place[a][l]);
+            let x = f[0][l] * d[0];
+            let y = f[1][l] * d[0] + f[2][l] * d[1];
+            let z = f[3][l] * d[0] + f[4][l] * d[1] + f[5][l] * d[2];
+            let (xx, xy, xz) = (x * x, x * y, x * z);
+            let (yy, yz, zz) = (y * y, y * z, z * z);
+            // Of each degree, the terms by x, y and z: their sum is the polynomial's part of that
+            // degree, and gradients follow from the same numbers.
+            let (q0, q1, q2) = (c[3][l], c[4][l], c[5][l]);
+            let (q3, q4, q5) = (c[6][l], c[7][l], c[8][l]);
+            let hx = 2.0 * q0 * x + q1 * y + q2 * z;
+            let hy = q1 * x + 2.0 * q3 * y + q4 * z;
+            let hz = q2 * x + q4 * y + 2.0 * q5 * z;
+            let (k0, k1, k2) = (c[9][l], c[10][l], c[11][l]);
+            let (k3, k4, k5) = (c[12][l], c[13][l], c[14][l]);
+            let (k6, k7, k8, k9) = (c[15][l], c[16][l], c[17][l], c[18][l]);
+            let kx = 3.0 * k0 * xx + 2.0 * (k1 * xy + k2 * xz) + k3 * yy + k4 * yz + k5 * zz;
+            let ky = k1 * xx + 2.0 * (k3 * xy + k7 * yz) + k4 * xz + 3.0 * k6 * yy + k8 * zz;
+            let kz = k2 * xx + k4 * xy + 2.0 * (k5 * xz + k8 * yz) + k7 * yy + 3.0 * k9 * zz;
+            // Euler: x·∇p = degree · p for each degree.
+            let first = c[0][l] * x + c[1][l] * y + c[2][l] * z;
+            let second = 0.5 * (x * hx + y * hy + z * hz);
+            let third = (1.0 / 3.0) * (x * kx + y * ky + z * kz);
+            let change = self.constant[l] + ((third + second) + first);
+            // Beyond its bounds a polynomial is constant.
+            let free = if change > self.low[l] && change < self.high[l] { share.n[l] } else { 0.0 };
+            let change = change.max(self.low[l]).min(self.high[l]);
+            let (gx, gy, gz) = (c[0][l] + hx + kx, c[1][l] + hy + ky, c[2][l] + hz + kz);
+            let value = self.value[l] + change;
+            out[0][l] = share.n[l] * value;
+            out[1][l] =
+                share.gradient[0][l] * value + free * (f[0][l] * gx + f[1][l] * gy + f[3][l] * gz);
+            out[2][l] = share.gradient[1][l] * value + free * (f[2][l] * gy + f[4][l] * gz);
+            out[3][l] = share.gradient[2][l] * value + free * (f[5][l] * gz);
+        }
+        out
+    }
+}

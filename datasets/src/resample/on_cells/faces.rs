@@ -1,0 +1,99 @@
+//! Finds which cell lies behind each face of a cell.
+//!
+//! Faces are compared by their points, as in `boundary_faces` of the model. Points of different
+//! blocks at the same place are one, so that a face of two blocks is none of the border.
+
+use super::Kind;
+use crate::resample::mesh::Mesh;
+use rayon::prelude::*;
+
+/// Behind the face is no cell.
+pub(super) const OUTSIDE: u32 = u32::MAX;
+/// Behind the face is a cell that the solver hides.
+pub(super) const HIDDEN: u32 = u32::MAX - 1;
+/// The face has no area: a side that collapsed.
+pub(super) const NO_FACE: u32 = u32::MAX - 2;
+
+/// The cell behind each face.
+pub(super) struct Neighbours {
+    /// Number of the first face of each cell.
+    starts: Vec<usize>,
+    /// In the order of `Shape::each_face`.
+    beyond: Vec<u32>,
+    crowded: usize,
+}
+
+/// Identifies a face whatever its orientation and first corner: the number of its different points
+/// and the four smallest of them.
+type FaceKey = (u32, [u32; 4]);
+
+impl Neighbours {
+    /// `same` is the first of the points at the same place.
+    pub(super) fn of(mesh: &Mesh, same: &[u32], kinds: &[Kind]) -> Neighbours {
+        let per_cell: Vec<u32> = (0..mesh.num_cells())
+            .into_par_iter()
+            .map(|cell| {
+                let mut faces = 0;
+                mesh.corners(cell).shape.each_face(|_| faces += 1);
+                faces
+            })
+            .collect();
+        let mut starts = vec![0];
+        starts.extend(per_cell.iter().scan(0, |sum, n| {
+            *sum += *n as usize;
+            Some(*sum)
+        }));
+        let keys_of = |cell: usize| {
+            let mut keys: Vec<(FaceKey, u32, usize)> = Vec::new();
+            if kinds[cell] == Kind::LeftOut {
+                return keys;
+            }
+            let corners = mesh.corners(cell);
+            let (mut face, mut distinct) = (starts[cell], Vec::new());
+            corners.shape.each_face(|ring| {
+                distinct.clear();
+                distinct.extend(ring.iter().map(|&i| same[corners.ids[i as usize] as usize]));
+                distinct.sort_unstable();
+                distinct.dedup();
+                if distinct.len() > 2 {
+                    let smallest =
+                        std::array::from_fn(|i| distinct.get(i).copied().unwrap_or(u32::MAX));
+                    keys.push(((distinct.len() as u32, smallest), cell as u32, face));
+                }
+                face += 1;
+            });
+            keys
+        };
+        let mut keys: Vec<(FaceKey, u32, usize)> =
+            (0..mesh.num_cells()).into_par_iter().flat_map_iter(keys_of).collect();
+        keys.par_sort_unstable();
+        let mut beyond = vec![NO_FACE; starts[mesh.num_cells()]];
+        let mut crowded = 0;
+        for shared in keys.chunk_by(|a, b| a.0 == b.0) {
+            match shared {
+                [(_, a, face_a), (_, b, face_b)] if a != b => {
+                    let seen = |cell: u32| match kinds[cell as usize] {
+                        Kind::Hidden => HIDDEN,
+                        _ => cell,
+                    };
+                    (beyond[*face_a], beyond[*face_b]) = (seen(*b), seen(*a));
+                }
+                all => {
+                    crowded += usize::from(all.len() > 2);
+                    all.iter().for_each(|(_, _, face)| beyond[*face] = OUTSIDE);
+                }
+            }
+        }
+        Neighbours { starts, beyond, crowded }
+    }
+
+    /// What lies behind the faces of a cell: a cell, or one of the constants.
+    pub(super) fn of_cell(&self, cell: usize) -> &[u32] {
+        &self.beyond[self.starts[cell]..self.starts[cell + 1]]
+    }
+
+    /// Number of faces that more than two cells have.
+    pub(super) fn crowded(&self) -> usize {
+        self.crowded
+    }
+}

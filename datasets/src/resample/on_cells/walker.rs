@@ -1,0 +1,184 @@
+//! Follows lines from cell to cell.
+
+use super::CellField;
+use super::blend::Share;
+use super::cell::PreparedCell;
+use super::faces::{HIDDEN, OUTSIDE};
+use super::shares::shares;
+use glam::DVec3;
+
+/// Places for prepared cells: a power of two. Rays that are near each other pass the same cells,
+/// a few hundred each.
+const KEPT: usize = 1024;
+/// Cells that are looked at for one that a place is in, at most.
+const MOST_NEAR: usize = 200;
+/// Cells that a line passes on the way back to where it is, at most.
+const MOST_CELLS: usize = 1_000_000;
+
+/// Where a line enters a cell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Entry {
+    /// Distance along the line.
+    pub distance: f64,
+    /// The cell that it enters.
+    pub cell: u32,
+    /// Whether it comes from a cell that the solver hides.
+    pub from_hidden: bool,
+}
+
+/// What lies beyond the face through which a line leaves a cell.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Beyond {
+    /// Another cell.
+    Cell(u32),
+    /// No cell with which it shares the face.
+    Outside,
+    /// A cell that the solver hides.
+    Hidden,
+}
+
+/// Follows lines through the cells of a field, one line at a time. It keeps the cells that it
+/// passed last, prepared for further lines; what it returns does not depend on them.
+pub struct CellWalker<'a> {
+    field: &'a CellField,
+    kept: Vec<Option<Box<(u32, PreparedCell)>>>,
+    shares: Vec<Share>,
+}
+
+impl<'a> CellWalker<'a> {
+    pub(super) fn new(field: &'a CellField) -> CellWalker<'a> {
+        let kept = std::iter::repeat_with(|| None).take(KEPT).collect();
+        CellWalker { field, kept, shares: Vec::with_capacity(1) }
+    }
+
+    fn slot(&mut self, cell: u32) -> usize {
+        // Fibonacci hashing: rows of a lattice must not share a slot.
+        let slot = (cell.wrapping_mul(0x9e37_79b9) >> 16) as usize % KEPT;
+        match &mut self.kept[slot] {
+            Some(kept) if kept.0 == cell => {}
+            Some(kept) => {
+                kept.0 = cell;
+                kept.1.prepare(self.field, cell as usize);
+            }
+            empty => {
+                let mut new = Box::new((cell, PreparedCell::default()));
+                new.1.prepare(self.field, cell as usize);
+                *empty = Some(new);
+            }
+        }
+        slot
+    }
+
+    fn prepared(&mut self, cell: u32) -> &PreparedCell {
+        let slot = self.slot(cell);
+        match &self.kept[slot] {
+            Some(kept) => &kept.1,
+            None => unreachable!("the slot was filled"),
+        }
+    }
+
+    /// The first cell that the line from `at` in `direction`, of length one, is in or enters within
+    /// `most`. `slack` is how far `at` may be beyond the face that it left through: faces within
+    /// this distance are entered, and not left. `None` when there is none.
+    ///
+    /// A line that is in a cell already, as where blocks overlap, gets this cell at distance 0.
+    pub fn enter(&mut self, at: DVec3, direction: DVec3, most: f64, slack: f64) -> Option<Entry> {
+        let field = self.field;
+        let passage =
+            field.border.first_passage(&field.mesh, at, direction, f64::INFINITY, slack)?;
+        let found = if passage.inwards {
+            Entry {
+                distance: passage.distance.max(0.0),
+                cell: passage.cell,
+                from_hidden: passage.hidden,
+            }
+        } else {
+            // The line leaves cells before it enters any, so it is inside: back to where it is.
+            let (distance, cell, beyond) = self.back(at, direction, passage.distance, passage.cell);
+            Entry { distance, cell, from_hidden: beyond == Beyond::Hidden }
+        };
+        (found.distance <= most).then_some(found)
+    }
+
+    /// From the face at `distance` back through the cells to `at`, or to where they end before it.
+    fn back(
+        &mut self,
+        at: DVec3,
+        direction: DVec3,
+        distance: f64,
+        mut cell: u32,
+    ) -> (f64, u32, Beyond) {
+        let mut from_start = distance;
+        let mut from = Beyond::Outside;
+        for _ in 0..MOST_CELLS {
+            let place = at + direction * from_start;
+            let Some((length, beyond)) = self.leave(cell, place, -direction, from) else { break };
+            from_start -= length;
+            from = Beyond::Cell(cell);
+            match beyond {
+                Beyond::Cell(next) if from_start > 0.0 => cell = next,
+                beyond => return (from_start.max(0.0), cell, beyond),
+            }
+        }
+        (from_start.max(0.0), cell, Beyond::Outside)
+    }
+
+    /// The distance at which the line from `at`, in the cell, in `direction` leaves it (negative in
+    /// one that is inside out and overlaps the cell that it comes from), and what
+    /// lies beyond. `None` when it passes no face of the cell outwards: rounding at an edge. `from`
+    /// is where it came from: at an edge of a bent face, it does not go back there at once.
+    pub fn leave(
+        &mut self,
+        cell: u32,
+        at: DVec3,
+        direction: DVec3,
+        from: Beyond,
+    ) -> Option<(f64, Beyond)> {
+        let from = match from {
+            Beyond::Cell(cell) => cell,
+            Beyond::Outside => OUTSIDE,
+            Beyond::Hidden => HIDDEN,
+        };
+        let (distance, beyond) = self.prepared(cell).way_out(at, direction, from)?;
+        let beyond = match beyond {
+            OUTSIDE => Beyond::Outside,
+            HIDDEN => Beyond::Hidden,
+            cell => Beyond::Cell(cell),
+        };
+        Some((distance, beyond))
+    }
+
+    /// A cell that a place is in, of those that are near a cell: its neighbours, and theirs.
+    pub fn near(&mut self, cell: u32, at: DVec3) -> Option<u32> {
+        let mut seen = vec![cell];
+        let mut next = 0;
+        while next < seen.len() && seen.len() < MOST_NEAR {
+            let prepared = self.prepared(seen[next]);
+            if prepared.contains(at) {
+                return Some(seen[next]);
+            }
+            let more: Vec<u32> = prepared.neighbours().collect();
+            seen.extend(more.into_iter().filter(|c| !seen.contains(c)).collect::<Vec<u32>>());
+            next += 1;
+        }
+        None
+    }
+
+    /// Value and gradient at a place in a cell; NaN in a cell without values.
+    pub fn sample(&mut self, cell: u32, at: DVec3) -> (f64, DVec3) {
+        let slot = self.slot(cell);
+        let CellWalker { kept, shares: of_corners, .. } = self;
+        let Some(kept) = &kept[slot] else { unreachable!("the slot was filled") };
+        let prepared = &kept.1;
+        let at = at - prepared.origin;
+        if !prepared.has_values || !shares(&prepared.corners, &prepared.map, at, of_corners) {
+            return (f64::NAN, DVec3::NAN);
+        }
+        prepared.polynomials.blend(at, of_corners)
+    }
+
+    /// Diagonal of a cell's box.
+    pub fn size(&mut self, cell: u32) -> f64 {
+        self.prepared(cell).size
+    }
+}

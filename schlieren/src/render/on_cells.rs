@@ -1,0 +1,57 @@
+//! Plans light paths through the cells of a mesh: as few steps in each cell as the tolerance
+//! allows.
+
+use super::planned::PlannedPaths;
+use crate::gas_on_cells::GasOnCells;
+use crate::march::OnCells;
+use crate::media::Bend;
+use crate::path::{Exit, LightPaths, PathQuantities};
+use crate::plan::{compare, sample_starts};
+use crate::view::View;
+
+/// Numbers of steps in each cell that are tried.
+const STEPS: [u32; 3] = [1, 2, 4];
+/// Steps of the rays that measure the error, by those of the plan.
+const FINER: u32 = 4;
+
+/// Paths whose error, measured with `measured_rays` rays in finer steps, is within the tolerance,
+/// if four steps in each cell reach it. Without measuring, there is one step.
+pub(super) fn planned(
+    gas: &GasOnCells,
+    view: View,
+    quantities: PathQuantities,
+    tolerance_rad: f64,
+    measured_rays: Option<usize>,
+) -> PlannedPaths<'_> {
+    let mut paths = OnCells::new(gas, view, quantities, STEPS[0]);
+    let (mut steps, mut error_rad) = (STEPS[0], None);
+    if let Some(rays) = measured_rays {
+        let starts = sample_starts(gas.size_m(), gas.centre_m(), &view, rays);
+        let trace = |steps: u32| {
+            let mut exits = vec![Exit::UNDISTURBED; starts.len()];
+            OnCells::new(gas, view, quantities, steps).trace_parallel(&starts, &mut exits);
+            exits
+        };
+        for tried in STEPS {
+            let (max_rad, _, _) = compare(&trace(tried), &trace(FINER * tried));
+            (steps, error_rad) = (tried, Some(max_rad));
+            if max_rad <= tolerance_rad {
+                break;
+            }
+        }
+        paths = OnCells::new(gas, view, quantities, steps);
+    }
+    let per_cell = if steps == 1 { "one step".into() } else { format!("{steps} steps") };
+    let (work, description) = (paths.work(), format!("verlet on cells, {per_cell} in each"));
+    let mut planned =
+        PlannedPaths::new(Box::new(paths), description, None, tolerance_rad, (Bend::Full, 1.0));
+    if let Some(error) = error_rad.filter(|e| *e > tolerance_rad) {
+        planned.warnings.push(format!(
+            "deflections are off by up to {error:.1e} rad, above the tolerance of \
+             {tolerance_rad:.1e} rad: the values change within a cell more than its steps follow; \
+             use a finer mesh or a larger tolerance (march.tolerance_rad)"
+        ));
+    }
+    (planned.error_rad, planned.cell_work) = (error_rad, Some(work));
+    planned
+}
