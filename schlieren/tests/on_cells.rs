@@ -137,8 +137,9 @@ fn linear_and_quadratic_fields_bend_light_as_they_should_on_bent_cells() {
     };
     let starts = grid(50, 0.9);
     let view = View::along(Axis::Z, DVec3::ZERO);
+    type Value = fn(DVec3) -> f64;
     type Slope = fn(f64, f64) -> [f64; 2];
-    let fields: [(&str, fn(DVec3) -> f64, Slope); 2] = [
+    let fields: [(&str, Value, Slope); 2] = [
         ("linear", |p| 1e-5 * (p.x - 2.0 * p.y), |_, _| [1e-5, -2e-5]),
         (
             "quadratic",

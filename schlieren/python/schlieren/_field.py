@@ -9,6 +9,7 @@ from schlieren import _arrays, _words
 from schlieren._meaning import OPTIONS, QUANTITIES, Meaning
 from schlieren._schlieren import Flow
 
+
 def _spacing(spacing, rank):
     if _arrays.is_number(spacing):
         found = [_arrays.number("spacing", spacing, "a positive number")] * rank

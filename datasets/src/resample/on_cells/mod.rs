@@ -332,7 +332,7 @@ fn shape_of(mesh: &Mesh, corners: &Corners) -> Shape {
         }
     });
     let diagonal = (high - low).length();
-    if !(volume > LEAST_VOLUME * diagonal.powi(3)) {
+    if volume.is_nan() || volume <= LEAST_VOLUME * diagonal.powi(3) {
         return left_out;
     }
     let folded = shape::Cell::new(&points, &corners.shape).is_folded();
