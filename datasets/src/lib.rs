@@ -9,6 +9,7 @@
 //! | [`image_io`] | images as PNG and multi-layer OpenEXR |
 //! | [`colormaps`], [`view`] | colours and cameras |
 //! | [`resample`] | data of any mesh on a uniform lattice, with a mask and the error |
+//! | [`stored_mesh`] | meshes in files that are larger than memory |
 //! | [`model`], [`read`], [`write`](mod@write) | data sets in files |
 //! | `cli` (feature) | conventions of all command-line programs of the workspace |
 #![forbid(unsafe_code)]
@@ -25,6 +26,7 @@ pub mod isosurface;
 pub mod model;
 pub mod read;
 pub mod resample;
+pub mod stored_mesh;
 #[cfg(test)]
 mod testing;
 pub mod view;

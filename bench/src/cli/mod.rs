@@ -116,8 +116,8 @@ struct ReportArgs {
 /// Options of `bench render`.
 #[derive(Debug, Args)]
 struct RenderArgs {
-    /// A mesh that `bench store` wrote, VTK (.vtp .vtu .vti .vtr .vts, parallel, .pvd, legacy), PLOT3D, NRRD, MetaImage, NumPy, OBJ,
-    /// glTF, PLY, STL, or the folder of an OpenFOAM case
+    /// VTK (.vtp .vtu .vti .vtr .vts, parallel, .pvd, legacy), PLOT3D, NRRD, MetaImage, NumPy, OBJ,
+    /// glTF, PLY, STL, the folder of an OpenFOAM case, or a mesh that `bench store` wrote
     file: PathBuf,
     /// The image as PNG
     #[arg(long, short, value_name = "PNG", required_unless_present = "exr")]

@@ -7,6 +7,7 @@ use datasets::cli::{Cancel, CommonArgs, CureExt as _, UsageError};
 use datasets::generate::nested_wavelet::{POINTS, isovalues_for};
 use datasets::generate::wavelet::Wavelet;
 use datasets::isosurface::{self, Options};
+use datasets::stored_mesh::{self, StoredMeshFile};
 use rt_core::bvh::{Geometry, StoredMeshReport, StoredMeshWriter};
 use rt_core::glam::DVec3;
 use rt_core::mesh::{MeshSlices, TriMesh};
@@ -93,7 +94,7 @@ fn store_file(
         common.warn(format_args!("{shown}: colours and scalars are not stored"));
     }
     let origin = first.origin;
-    let mut writer = StoredMeshWriter::create(&args.out, origin)?;
+    let mut writer = stored_mesh::create(&args.out, origin)?;
     writer.set_memory(memory);
     let bar = common.progress(meshes.len() as u64, "storing");
     for (number, mesh) in meshes.drain(..).enumerate() {
@@ -101,11 +102,15 @@ fn store_file(
         add(&mut writer, &mesh, origin)?;
         bar.set_position(number as u64 + 1);
     }
-    Ok(writer.finish()?)
+    Ok(stored_mesh::finish(writer)?)
 }
 
 /// Adds a mesh, moved where it has another origin.
-fn add(writer: &mut StoredMeshWriter, mesh: &TriMesh, origin: DVec3) -> anyhow::Result<()> {
+fn add(
+    writer: &mut StoredMeshWriter<StoredMeshFile>,
+    mesh: &TriMesh,
+    origin: DVec3,
+) -> anyhow::Result<()> {
     if mesh.origin == origin {
         return Ok(writer.add(&MeshSlices::of_mesh(mesh))?);
     }
@@ -126,7 +131,7 @@ fn store_wavelet(
 ) -> anyhow::Result<StoredMeshReport> {
     let grid = Wavelet::with_points(POINTS).grid()?;
     let isovalues = isovalues_for(&grid, millions as usize * 1_000_000)?;
-    let mut writer = StoredMeshWriter::create(&args.out, DVec3::ZERO)?;
+    let mut writer = stored_mesh::create(&args.out, DVec3::ZERO)?;
     writer.set_memory(memory);
     let bar = common.progress(isovalues.len() as u64, "storing");
     for (number, isovalue) in isovalues.iter().enumerate() {
@@ -136,5 +141,5 @@ fn store_wavelet(
         add(&mut writer, &surface.mesh, DVec3::ZERO)?;
         bar.set_position(number as u64 + 1);
     }
-    Ok(writer.finish()?)
+    Ok(stored_mesh::finish(writer)?)
 }

@@ -33,7 +33,7 @@ pub(super) fn open(
         .into());
     }
     let memory = usize::try_from(args.memory).unwrap_or(usize::MAX).saturating_mul(1 << 20);
-    Ok(Some(Arc::new(StoredMesh::open(&args.file, memory)?)))
+    Ok(Some(Arc::new(datasets::stored_mesh::open(&args.file, memory)?)))
 }
 
 /// What was read of it, for the result in JSON.

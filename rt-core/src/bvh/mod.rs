@@ -44,7 +44,9 @@ pub use options::{BuildOptions, BuildQuality, BuildReport, Robustness, Storage, 
 pub use partition::GlobalLayout;
 pub use ray_query::{MaskError, RayQuery};
 pub use refit::{RefitError, RefitReport};
-pub use stored_mesh::{PageUse, StoredMesh, StoredMeshError, StoredMeshReport, StoredMeshWriter};
+pub use stored_mesh::{
+    PageSink, PageSource, PageUse, StoredMesh, StoredMeshError, StoredMeshReport, StoredMeshWriter,
+};
 pub(crate) use streams::Coherence;
 pub use streams::StreamError;
 pub use validate::{InvalidTree, TreeStats};

@@ -329,7 +329,6 @@ fn lines_through_points_edges_and_faces_cross_the_whole_cube() {
                 lost += usize::from((inside - chord).abs() > 1e-4);
             }
         }
-        println!("{split:?} {share}: {lost} of {lines} lines are lost");
         assert!(lost == 0, "{split:?} {share}: {lost} of {lines} lines are lost");
     }
 }

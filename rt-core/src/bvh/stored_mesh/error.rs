@@ -1,72 +1,62 @@
-//! Errors of meshes in files.
+//! Errors of stored meshes.
 
 use crate::mesh::MeshError;
 use glam::DVec3;
-use std::io;
-use std::path::PathBuf;
 
-/// Why a mesh could not be written to a file, or not be read from one.
-#[derive(Debug, thiserror::Error)]
+/// Why a mesh could not be stored, or a stored one not be opened.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum StoredMeshError {
-    /// The file could not be opened, created, read or written.
-    #[error("{}: cannot {action}: {source}", path.display())]
+    /// The bytes could not be read or written.
+    #[error("{name}: {reason}")]
     Io {
-        /// The file.
-        path: PathBuf,
-        /// What was tried.
-        action: &'static str,
-        /// The system's reason.
-        source: io::Error,
+        /// The file, or what else the bytes are in.
+        name: String,
+        /// What was tried, and why it failed.
+        reason: String,
     },
-    /// The file is something else.
+    /// The bytes are something else.
     #[error(
-        "{}: this is not a stored mesh (it does not start with RTSVMESH); make one with \
-         StoredMeshWriter, or with `bench store`",
-        path.display()
+        "{name}: this is not a stored mesh (it does not start with RTSVMESH), or one that was \
+         never finished; `bench store` makes one"
     )]
     NotAStoredMesh {
         /// The file.
-        path: PathBuf,
+        name: String,
     },
-    /// The file has another version of the format.
+    /// Another version of the format.
     #[error(
-        "{}: version {found} of the format; this program reads version {expected}: store the mesh \
-         again",
-        path.display()
+        "{name}: version {found} of the format; this program reads version {expected}: store the \
+         mesh again"
     )]
     Version {
         /// The file.
-        path: PathBuf,
+        name: String,
         /// Its version.
         found: u32,
         /// The version that can be read.
         expected: u32,
     },
-    /// The file is longer or shorter than its header says.
+    /// More or fewer bytes than the header says.
     #[error(
-        "{}: {found} bytes, but the header says {expected}: the file was cut, or is still being \
-         copied; copy it or store the mesh again",
-        path.display()
+        "{name}: {found} bytes, but the header says {expected}: the file was cut, or is still \
+         being copied; copy it or store the mesh again"
     )]
     Length {
         /// The file.
-        path: PathBuf,
-        /// Bytes in the file.
+        name: String,
+        /// Bytes there.
         found: u64,
         /// Bytes that the header names.
         expected: u64,
     },
     /// The bytes of the header, of the table of pages or of a page are not those that were written.
-    #[error(
-        "{}: {part} at byte {offset} is damaged: {reason}; store the mesh again",
-        path.display()
-    )]
+    #[error("{name}: {part} at byte {offset} is damaged: {reason}; store the mesh again")]
     Damaged {
         /// The file.
-        path: PathBuf,
+        name: String,
         /// The part of the file.
-        part: &'static str,
+        part: String,
         /// Where the part starts.
         offset: u64,
         /// What is wrong.

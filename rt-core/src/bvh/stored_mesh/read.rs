@@ -1,6 +1,7 @@
 //! Reads the pages of a stored mesh as rays need them.
 
 use super::StoredMeshReport;
+use super::bytes::PageSource;
 use super::cache::{PageCache, PageUse};
 use super::error::StoredMeshError;
 use super::format::{
@@ -15,27 +16,13 @@ use crate::ray::Ray;
 use crate::shapes::{Shape, ShapeHit, ShapeSurface, rounded_point};
 use fearless_simd::Level;
 use glam::DVec3;
-use std::fs::File;
-use std::io;
-use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-/// A mesh in a file, as a shape: its primitives are the pages of the file. Made by a
-/// [`super::StoredMeshWriter`], where an example is.
-///
-/// ```no_run
-/// use rt_core::bvh::StoredMesh;
-/// use rt_core::prelude::*;
-/// use std::sync::Arc;
-///
-/// let mesh = Arc::new(StoredMesh::open("flow.rtmesh", 2 << 30)?);
-/// let mut scene = SceneBuilder::new();
-/// scene.shape(mesh, Material::matte([0.7, 0.7, 0.7]));
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
+/// A mesh in bytes elsewhere, as a shape: its primitives are pages. [`super::StoredMeshWriter`]
+/// stores meshes, and has an example. The member `datasets` opens
+/// files (`datasets::stored_mesh`).
 pub struct StoredMesh {
-    path: PathBuf,
-    file: File,
+    source: Box<dyn PageSource>,
     header: Header,
     table: Vec<PageEntry>,
     cache: PageCache,
@@ -45,40 +32,39 @@ pub struct StoredMesh {
 }
 
 impl StoredMesh {
-    /// Opens a file and reads the table of its pages. Pages in memory take at most `budget` bytes,
-    /// and the page at hand and the last 16 of each thread besides.
+    /// Reads the table of pages. Pages in memory take at most `budget` bytes, and the page at hand
+    /// and the last 16 of each thread besides.
     ///
     /// # Errors
-    /// When the file cannot be read, is no stored mesh, has another version, was cut, or its header
-    /// or table is damaged.
-    pub fn open(path: impl AsRef<Path>, budget: usize) -> Result<StoredMesh, StoredMeshError> {
+    /// When the source cannot be read, is no stored mesh, has another version, was cut, or its
+    /// header or table is damaged; and on big-endian machines.
+    pub fn open(
+        source: impl PageSource + 'static,
+        budget: usize,
+    ) -> Result<StoredMesh, StoredMeshError> {
         if cfg!(target_endian = "big") {
             return Err(StoredMeshError::BigEndian);
         }
-        let path = path.as_ref().to_path_buf();
-        let io = |action| {
-            let path = path.clone();
-            move |source| StoredMeshError::Io { path, action, source }
-        };
-        let file = File::open(&path).map_err(io("open it"))?;
-        let found = file.metadata().map_err(io("look at it"))?.len();
+        let io = |reason| StoredMeshError::Io { name: source.name(), reason };
+        let found = source.length().map_err(io)?;
         let mut bytes = [0; HEADER_BYTES];
         if found < HEADER_BYTES as u64 {
-            return Err(StoredMeshError::NotAStoredMesh { path });
+            return Err(StoredMeshError::NotAStoredMesh { name: source.name() });
         }
-        read_at(&file, &mut bytes, 0).map_err(io("read"))?;
+        source.read(0, &mut bytes).map_err(io)?;
         let header = Header::read(&bytes).map_err(|e| match e {
-            NoHeader::OtherFile => StoredMeshError::NotAStoredMesh { path: path.clone() },
+            NoHeader::OtherFile => StoredMeshError::NotAStoredMesh { name: source.name() },
             NoHeader::OtherVersion(found) => {
-                StoredMeshError::Version { path: path.clone(), found, expected: VERSION }
+                StoredMeshError::Version { name: source.name(), found, expected: VERSION }
             }
-            NoHeader::Damaged => damaged(&path, "the header", 0, WRONG_CHECKSUM),
+            NoHeader::Damaged => damaged(&source, "the header", 0, WRONG_CHECKSUM),
         })?;
         if header.length != found {
-            return Err(StoredMeshError::Length { path, found, expected: header.length });
+            let expected = header.length;
+            return Err(StoredMeshError::Length { name: source.name(), found, expected });
         }
         let at = header.table;
-        let bad_table = |reason: &str| damaged(&path, "the table of pages", at, reason);
+        let bad_table = |reason: &str| damaged(&source, "the table of pages", at, reason);
         let bytes = header.pages.checked_mul(ENTRY_BYTES as u64);
         if header.pages >= u64::from(u32::MAX)
             || bytes.and_then(|bytes| at.checked_add(bytes)) != Some(found)
@@ -86,7 +72,7 @@ impl StoredMesh {
             return Err(bad_table("it does not end where the file does"));
         }
         let mut bytes = vec![0; header.pages as usize * ENTRY_BYTES];
-        read_at(&file, &mut bytes, at).map_err(io("read"))?;
+        source.read(at, &mut bytes).map_err(io)?;
         if checksum(&bytes) != header.table_checksum {
             return Err(bad_table(WRONG_CHECKSUM));
         }
@@ -99,7 +85,8 @@ impl StoredMesh {
         }
         let cache = PageCache::new(new_key(), table.len(), budget);
         let (level, failure) = (Level::new(), OnceLock::new());
-        Ok(StoredMesh { path, file, header, table, cache, level, failure })
+        let source = Box::new(source);
+        Ok(StoredMesh { source, header, table, cache, level, failure })
     }
 
     /// Whether a file that starts with these bytes, 8 at least, is a stored mesh of any version.
@@ -150,18 +137,10 @@ impl StoredMesh {
         let entry = &self.table[number as usize];
         let mut units = vec![Unit::ZERO; entry.units as usize];
         let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut units);
-        read_at(&self.file, bytes, entry.offset).map_err(|source| StoredMeshError::Io {
-            path: self.path.clone(),
-            action: "read a page of it",
-            source,
-        })?;
+        let io = |reason| StoredMeshError::Io { name: self.source.name(), reason };
+        self.source.read(entry.offset, bytes).map_err(io)?;
         let part = format!("page {number}");
-        let bad = |reason: &str| StoredMeshError::Damaged {
-            path: self.path.clone(),
-            part: "a page",
-            offset: entry.offset,
-            reason: format!("{part}: {reason}"),
-        };
+        let bad = |reason: &str| damaged(&*self.source, &part, entry.offset, reason);
         if checksum(bytes) != entry.checksum {
             return Err(bad(WRONG_CHECKSUM));
         }
@@ -177,28 +156,9 @@ impl StoredMesh {
 
 const WRONG_CHECKSUM: &str = "its checksum is wrong";
 
-fn damaged(path: &Path, part: &'static str, offset: u64, reason: &str) -> StoredMeshError {
-    StoredMeshError::Damaged { path: path.to_path_buf(), part, offset, reason: reason.into() }
-}
-
-/// Reads all of `bytes` from `offset` on, without a position that threads would share.
-#[cfg(unix)]
-fn read_at(file: &File, bytes: &mut [u8], offset: u64) -> io::Result<()> {
-    std::os::unix::fs::FileExt::read_exact_at(file, bytes, offset)
-}
-
-/// Reads all of `bytes` from `offset` on, without a position that threads would share.
-#[cfg(windows)]
-fn read_at(file: &File, mut bytes: &mut [u8], mut offset: u64) -> io::Result<()> {
-    while !bytes.is_empty() {
-        let read = std::os::windows::fs::FileExt::seek_read(file, bytes, offset)?;
-        if read == 0 {
-            return Err(io::ErrorKind::UnexpectedEof.into());
-        }
-        bytes = &mut bytes[read..];
-        offset += read as u64;
-    }
-    Ok(())
+fn damaged(source: &dyn PageSource, part: &str, offset: u64, reason: &str) -> StoredMeshError {
+    let (name, part, reason) = (source.name(), part.into(), reason.into());
+    StoredMeshError::Damaged { name, part, offset, reason }
 }
 
 /// Whether a ray enters a box, which is wider than what it holds. As the traversal's test.

@@ -7,29 +7,7 @@ use crate::ray::Ray;
 use crate::shapes::Shape;
 use crate::test_shapes::Random;
 use glam::{DAffine3, DVec3, Vec3};
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
-
-/// A folder that is removed at the end.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(name: &str) -> Folder {
-        let folder = std::env::temp_dir().join(format!("rt-core-{name}-{}", std::process::id()));
-        std::fs::create_dir_all(&folder).expect("a folder");
-        Folder(folder)
-    }
-
-    fn file(&self, name: &str) -> PathBuf {
-        self.0.join(name)
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
-}
+use std::sync::{Arc, Mutex};
 
 /// A closed, uneven ball of 2 · rings · 2 · rings triangles.
 fn ball(rings: u32) -> TriMesh {
@@ -51,15 +29,15 @@ fn ball(rings: u32) -> TriMesh {
     TriMesh::new(positions, indices)
 }
 
-/// Writes a mesh in pieces of `piece` triangles.
-fn store(mesh: &TriMesh, piece: usize, path: &Path) -> StoredMeshReport {
-    let mut writer = StoredMeshWriter::create(path, mesh.origin).expect("a new file");
+/// Stores a mesh in pieces of `piece` triangles.
+fn store(mesh: &TriMesh, piece: usize) -> (Vec<u8>, StoredMeshReport) {
+    let mut writer = StoredMeshWriter::new(Vec::new(), mesh.origin).expect("memory");
     writer.set_memory(52 * 25_000);
     let all = MeshSlices::of_mesh(mesh);
     for indices in all.indices.chunks(3 * piece) {
         writer.add(&MeshSlices { indices, ..all }).expect("a piece");
     }
-    writer.finish().expect("a complete file")
+    writer.finish().expect("a sound mesh")
 }
 
 fn world_of(geometry: Geometry) -> World {
@@ -82,16 +60,14 @@ fn rays(count: usize) -> Vec<Ray> {
 
 #[test]
 fn hits_are_those_of_the_mesh_in_memory_bit_for_bit_with_any_budget() {
-    let folder = Folder::new("stored-hits");
     let mesh = ball(160);
-    let path = folder.file("ball.rtmesh");
-    let report = store(&mesh, 10_000, &path);
+    let (bytes, report) = store(&mesh, 10_000);
     assert_eq!((report.triangles, report.skipped), (mesh.indices.len() as u64, 0));
     assert!(report.pages > 8, "{report:?}");
     assert!(report.bytes < 17 * report.triangles, "{report:?}");
     let resident = world_of(Geometry::Mesh(Arc::new(mesh)));
     for budget in [0, 300_000, usize::MAX] {
-        let stored = Arc::new(StoredMesh::open(&path, budget).expect("a sound file"));
+        let stored = Arc::new(StoredMesh::open(bytes.clone(), budget).expect("sound bytes"));
         let world = world_of(Geometry::Shape(stored.clone()));
         let (mut hits, mut blocked) = (0, 0);
         for ray in rays(4000) {
@@ -121,24 +97,19 @@ fn hits_are_those_of_the_mesh_in_memory_bit_for_bit_with_any_budget() {
 
 #[test]
 fn the_same_pieces_make_the_same_file_on_one_thread_and_on_four() {
-    let folder = Folder::new("stored-threads");
     let mesh = ball(90);
     let files = [1, 4].map(|threads| {
-        let path = folder.file(&format!("{threads}.rtmesh"));
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-        pool.install(|| store(&mesh, 7000, &path));
-        std::fs::read(path).expect("the file")
+        pool.install(|| store(&mesh, 7000).0)
     });
     assert!(files[0] == files[1]);
 }
 
 #[test]
 fn surfaces_have_the_normal_and_a_point_of_the_triangle() {
-    let folder = Folder::new("stored-surface");
     let mesh = ball(60);
-    let path = folder.file("ball.rtmesh");
-    store(&mesh, usize::MAX / 3, &path);
-    let stored = StoredMesh::open(&path, 1 << 20).expect("a sound file");
+    let (bytes, _) = store(&mesh, usize::MAX / 3);
+    let stored = StoredMesh::open(bytes, 1 << 20).expect("sound bytes");
     let mut hits = 0;
     for ray in rays(600) {
         for page in 0..stored.num_primitives() as u32 {
@@ -159,15 +130,13 @@ fn surfaces_have_the_normal_and_a_point_of_the_triangle() {
 
 #[test]
 fn triangles_that_cannot_be_hit_are_counted_and_keep_their_numbers() {
-    let folder = Folder::new("stored-skipped");
-    let path = folder.file("few.rtmesh");
-    let mut writer = StoredMeshWriter::create(&path, DVec3::ZERO).expect("a new file");
+    let mut writer = StoredMeshWriter::new(Vec::new(), DVec3::ZERO).expect("memory");
     let corners = [0.0, 0.0, 1.0, 1.0, 0.0, 1.0, 0.0, 1.0, 1.0, f32::NAN, 0.0, 0.0];
     writer.add(&MeshSlices::new(&corners, &[0, 1, 3, 0, 1, 9, 0, 1, 2])).expect("a piece");
     writer.add(&MeshSlices::new(&[], &[])).expect("an empty piece");
-    let report = writer.finish().expect("a complete file");
+    let (bytes, report) = writer.finish().expect("a sound mesh");
     assert_eq!((report.triangles, report.skipped, report.pages), (3, 2, 1));
-    let stored = StoredMesh::open(&path, 0).expect("a sound file");
+    let stored = StoredMesh::open(bytes, 0).expect("sound bytes");
     let up = Ray::new(Vec3::new(0.2, 0.2, 0.0), Vec3::Z);
     assert_eq!(stored.triangle(0, &up), Some(2));
     assert_eq!(stored.triangle(1, &up), None);
@@ -175,127 +144,102 @@ fn triangles_that_cannot_be_hit_are_counted_and_keep_their_numbers() {
 
 #[test]
 fn a_file_without_triangles_is_an_empty_shape() {
-    let folder = Folder::new("stored-empty");
-    let path = folder.file("empty.rtmesh");
-    let writer = StoredMeshWriter::create(&path, DVec3::ZERO).expect("a new file");
-    assert_eq!(writer.finish().expect("a complete file").pages, 0);
-    let stored = Arc::new(StoredMesh::open(&path, 0).expect("a sound file"));
+    let writer = StoredMeshWriter::new(Vec::new(), DVec3::ZERO).expect("memory");
+    let (bytes, report) = writer.finish().expect("no mesh");
+    assert_eq!(report.pages, 0);
+    let stored = Arc::new(StoredMesh::open(bytes, 0).expect("sound bytes"));
     let world = world_of(Geometry::Shape(stored));
     assert!(world.closest(&Ray::new(Vec3::ZERO, Vec3::Z)).is_none());
 }
 
 #[test]
-fn pieces_that_cannot_be_stored_are_refused_by_number_and_leave_no_file() {
-    let folder = Folder::new("stored-refused");
-    let path = folder.file("a.rtmesh");
+fn pieces_that_cannot_be_stored_are_refused_by_number() {
     let triangle = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
     let of = |scale: f32| triangle.map(|x: f32| x * scale);
-    let mut writer = StoredMeshWriter::create(&path, DVec3::ZERO).expect("a new file");
+    let new = || StoredMeshWriter::new(Vec::new(), DVec3::ZERO).expect("memory");
+    let mut writer = new();
     let elsewhere = MeshSlices { origin: DVec3::X, ..MeshSlices::new(&triangle, &[0, 1, 2]) };
     writer.add(&MeshSlices::new(&triangle, &[0, 1, 2])).expect("a piece");
     let error = writer.add(&elsewhere).expect_err("another origin");
     assert!(error.to_string().starts_with("piece 1 "), "{error}");
     let error = writer.add(&MeshSlices::new(&triangle, &[0, 1])).expect_err("two numbers");
     assert!(matches!(error, StoredMeshError::Mesh { piece: 1, .. }), "{error}");
-    drop(writer);
     for scale in [1e10, 1e-8] {
-        let mut writer = StoredMeshWriter::create(&path, DVec3::ZERO).expect("a new file");
+        let mut writer = new();
         writer.add(&MeshSlices::new(&of(scale), &[0, 1, 2])).expect("a piece");
         let error = writer.finish().expect_err("coordinates out of range");
         assert!(matches!(error, StoredMeshError::Reach { .. }), "{error}");
     }
-    assert_eq!(std::fs::read_dir(&folder.0).expect("the folder").count(), 0);
-    let error = StoredMeshWriter::create(folder.file("none/a.rtmesh"), DVec3::ZERO).err();
-    assert!(error.expect("no folder").to_string().contains("none"));
 }
 
 #[test]
-fn a_file_that_was_cut_or_is_something_else_is_refused() {
-    let folder = Folder::new("stored-cut");
-    let path = folder.file("ball.rtmesh");
-    store(&ball(20), 1000, &path);
-    let whole = std::fs::read(&path).expect("the file");
-    let open = |bytes: &[u8]| {
-        std::fs::write(&path, bytes).expect("a new file");
-        StoredMesh::open(&path, 0).err().map(|e| e.to_string())
-    };
+fn bytes_that_were_cut_or_are_something_else_are_refused() {
+    let (whole, _) = store(&ball(20), 1000);
+    let open = |bytes: &[u8]| StoredMesh::open(bytes.to_vec(), 0).err().map(|e| e.to_string());
     assert_eq!(open(&whole), None);
     for length in [0, 1, 8, 127, 128, 129, whole.len() / 2, whole.len() - 1] {
-        let error = open(&whole[..length]).expect("a cut file");
-        assert!(error.contains("ball.rtmesh"), "{length}: {error}");
+        let error = open(&whole[..length]).expect("cut bytes");
+        assert!(error.contains("bytes in memory"), "{length}: {error}");
     }
     let longer = [&whole[..], &[0]].concat();
-    assert!(open(&longer).expect("a longer file").contains("bytes, but the header says"));
+    assert!(open(&longer).expect("more bytes").contains("bytes, but the header says"));
     let mut other = whole.clone();
     other[8] = 2;
     assert!(open(&other).expect("another version").contains("version 2"));
     let error = open(b"solid ball").expect("another format");
     assert!(error.contains("not a stored mesh"), "{error}");
-    // One that was never finished.
     let unfinished = [&[0; 128], &whole[128..]].concat();
-    assert!(open(&unfinished).expect("no header").contains("not a stored mesh"));
+    assert!(open(&unfinished).expect("no header").contains("never finished"));
+}
+
+/// Bytes that change while a mesh reads them.
+#[derive(Clone)]
+struct Changing(Arc<Mutex<Vec<u8>>>);
+
+impl PageSource for Changing {
+    fn name(&self) -> String {
+        "changing".into()
+    }
+
+    fn length(&self) -> Result<u64, String> {
+        self.0.lock().expect("no panic").length()
+    }
+
+    fn read(&self, offset: u64, bytes: &mut [u8]) -> Result<(), String> {
+        PageSource::read(&*self.0.lock().expect("no panic"), offset, bytes)
+    }
 }
 
 #[test]
 fn a_page_that_changes_below_us_is_a_failure_and_not_a_wrong_hit_in_silence() {
-    let folder = Folder::new("stored-changed");
-    let path = folder.file("ball.rtmesh");
-    store(&ball(20), 1000, &path);
+    let (whole, _) = store(&ball(20), 1000);
+    let changing = Changing(Arc::new(Mutex::new(whole.clone())));
     let ray = Ray::new(Vec3::new(0.1, 0.2, -3.0), Vec3::Z);
-    let open = || StoredMesh::open(&path, 0).expect("a sound file");
+    let open = || {
+        *changing.0.lock().expect("no panic") = whole.clone();
+        StoredMesh::open(changing.clone(), 0).expect("sound bytes")
+    };
     let hit_somewhere = |mesh: &StoredMesh| {
         (0..mesh.num_primitives() as u32).any(|page| mesh.closest(page, &ray).is_some())
     };
     let mesh = open();
     assert!(hit_somewhere(&mesh) && mesh.failure().is_none());
 
-    // ---- A byte of a page changes.
     let mesh = open();
-    let mut bytes = std::fs::read(&path).expect("the file");
-    bytes[700] ^= 1;
-    std::fs::write(&path, &bytes).expect("the same file");
+    changing.0.lock().expect("no panic")[700] ^= 1;
     assert!(!hit_somewhere(&mesh));
     let failure = mesh.failure().expect("a failure");
     assert!(failure.contains("checksum") && failure.contains("byte 128"), "{failure}");
-    bytes[700] ^= 1;
-    std::fs::write(&path, &bytes).expect("the same file");
 
-    // ---- A render of it fails, and one of the sound file does not.
-    #[cfg(feature = "render")]
-    {
-        use crate::prelude::*;
-        let mesh = Arc::new(open());
-        let mut builder = SceneBuilder::new();
-        builder.shape(mesh, Material::matte([0.5; 3]));
-        let scene = builder.build().expect("a scene");
-        let eye = DVec3::new(0.0, 0.0, -4.0);
-        let camera = Camera::perspective(eye, DVec3::ZERO, DVec3::Y, 0.5, 1.0, [0.1, 9.0])
-            .expect("a camera");
-        let options = RenderOptions::new(16, 16);
-        bytes[700] ^= 1;
-        std::fs::write(&path, &bytes).expect("the same file");
-        let error = crate::render::render(&scene, &camera, &options).expect_err("a failure");
-        assert!(
-            matches!(error, crate::render::RenderError::Unreadable { geometry: 0, .. }),
-            "{error}"
-        );
-        bytes[700] ^= 1;
-        std::fs::write(&path, &bytes).expect("the same file");
-        let mut builder = SceneBuilder::new();
-        builder.shape(Arc::new(open()), Material::matte([0.5; 3]));
-        let sound = builder.build().expect("a scene");
-        assert!(crate::render::render(&sound, &camera, &options).is_ok());
-    }
-
-    // ---- The file is cut while it is open.
-    let mesh = open();
-    let file = std::fs::OpenOptions::new().write(true).open(&path).expect("the file");
-    file.set_len(200).expect("a shorter file");
+    let mesh = Arc::new(open());
+    changing.0.lock().expect("no panic").truncate(200);
     assert!(!hit_somewhere(&mesh));
-    assert!(mesh.failure().expect("a failure").contains("read a page"));
+    assert!(mesh.failure().expect("a failure").contains("no "));
+    let world = world_of(Geometry::Shape(mesh));
+    assert!(world.failure().is_some_and(|(geometry, _)| geometry == 0));
 }
 
-/// The file with the checksums of what it holds now.
+/// The bytes with the checksums of what they are now.
 fn resealed(mut bytes: Vec<u8>) -> Vec<u8> {
     use super::format::{ENTRY_BYTES, HEADER_BYTES, Header, PageEntry, UNIT_BYTES, checksum};
     let header: &[u8; HEADER_BYTES] = bytes.first_chunk().expect("a header");
@@ -314,10 +258,7 @@ fn resealed(mut bytes: Vec<u8>) -> Vec<u8> {
 
 #[test]
 fn pages_with_any_bits_and_the_right_checksum_end_in_failures_or_hits_and_never_in_a_panic() {
-    let folder = Folder::new("stored-fuzzed");
-    let path = folder.file("ball.rtmesh");
-    store(&ball(12), 1000, &path);
-    let whole = std::fs::read(&path).expect("the file");
+    let (whole, _) = store(&ball(12), 1000);
     assert!(resealed(whole.clone()) == whole);
     let rays = rays(40);
     let mut r = Random::new(11);
@@ -334,8 +275,8 @@ fn pages_with_any_bits_and_the_right_checksum_end_in_failures_or_hits_and_never_
                 _ => bytes[at] ^= bit,
             }
         }
-        std::fs::write(&path, resealed(bytes)).expect("the same file");
-        let mesh = Arc::new(StoredMesh::open(&path, 0).expect("the table is sound"));
+        let mesh = StoredMesh::open(resealed(bytes), 0).expect("the table is sound");
+        let mesh = Arc::new(mesh);
         let world = world_of(Geometry::Shape(mesh.clone()));
         for ray in &rays {
             let hit = world.closest(ray);

@@ -1,5 +1,6 @@
-//! Writes a mesh to a file, piece by piece.
+//! Stores a mesh piece by piece.
 
+use super::bytes::PageSink;
 use super::error::StoredMeshError;
 use super::format::{ENTRY_BYTES, HEADER_BYTES, Header, PageEntry, UNIT_BYTES, checksum};
 use crate::bvh::build::UNWATCHED;
@@ -11,9 +12,6 @@ use crate::math::Aabb;
 use crate::mesh::MeshSlices;
 use glam::DVec3;
 use rayon::prelude::*;
-use std::fs::File;
-use std::io::{self, BufWriter, Seek, SeekFrom, Write};
-use std::path::{Path, PathBuf};
 
 /// Most triangles of a page: about 57 kB.
 const PAGE_TRIANGLES: usize = 1 << 12;
@@ -24,16 +22,17 @@ const DEFAULT_MEMORY: usize = 1 << 30;
 /// Pages that are built before they are written.
 const PAGES_AT_ONCE: usize = 64;
 
-/// Writes a mesh that need not fit into memory to a file that [`super::StoredMesh`] reads. The piece
-/// at hand is in memory, and small pieces before it up to a limit
+/// Writes a mesh that need not fit into memory in the form that [`super::StoredMesh`] reads. The
+/// piece at hand is in memory, and small pieces before it up to a limit
 /// ([`StoredMeshWriter::set_memory`]).
 ///
 /// What is written at once is divided among pages by place. So rays meet the fewest pages when
 /// pieces that lie in the same place are written together: layers, for example, want memory for as
 /// many of them as possible.
 ///
-/// The file has another name, which ends in `.partial`, until [`StoredMeshWriter::finish`]. The
-/// same pieces make the same bytes for any number of threads.
+/// The same pieces make the same bytes for any number of threads. The first bytes are written last,
+/// so what was not finished cannot be opened. The member `datasets` stores
+/// meshes in files (`datasets::stored_mesh`).
 ///
 /// ```
 /// use rt_core::bvh::{StoredMesh, StoredMeshWriter};
@@ -41,31 +40,27 @@ const PAGES_AT_ONCE: usize = 64;
 /// use rt_core::prelude::*;
 /// use std::sync::Arc;
 ///
-/// # let folder = std::env::temp_dir().join(format!("rt-core-stored-{}", std::process::id()));
-/// # std::fs::create_dir_all(&folder)?;
-/// let path = folder.join("plates.rtmesh");
-/// let mut writer = StoredMeshWriter::create(&path, DVec3::ZERO)?;
+/// let mut writer = StoredMeshWriter::new(Vec::new(), DVec3::ZERO)?;
 /// for k in 0..3 {
 ///     let z = k as f32;
 ///     let corners = [0., 0., z, 4., 0., z, 0., 4., z];
 ///     writer.add(&MeshSlices::new(&corners, &[0, 1, 2]))?;
 /// }
-/// writer.finish()?;
+/// let (bytes, report) = writer.finish()?;
+/// assert_eq!((report.triangles, report.skipped), (3, 0));
 ///
-/// let mesh = Arc::new(StoredMesh::open(&path, 64 << 20)?);
+/// let mesh = Arc::new(StoredMesh::open(bytes, 64 << 20)?);
 /// let placed = Instance { geometry: 0, world_from_object: DAffine3::IDENTITY };
 /// let options = BuildOptions::default();
 /// let world = World::build(vec![Geometry::Shape(mesh.clone())], vec![placed], &options)?;
 /// let up = Ray::new(Vec3::new(1.0, 1.0, -1.0), Vec3::Z);
 /// let hit = world.closest(&up).expect("a hit");
 /// assert_eq!((hit.t, mesh.triangle(hit.prim, &up)), (1.0, Some(0)));
-/// assert!(mesh.failure().is_none());
-/// # std::fs::remove_dir_all(&folder)?;
+/// assert!(world.failure().is_none());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub struct StoredMeshWriter {
-    path: PathBuf,
-    file: PartialFile,
+pub struct StoredMeshWriter<S> {
+    sink: S,
     origin: DVec3,
     quality: BuildQuality,
     /// Pieces given so far.
@@ -102,26 +97,20 @@ struct Waiting {
     indices: Vec<u32>,
 }
 
-impl StoredMeshWriter {
-    /// Starts a file. All positions are relative to `origin`; choose it near the middle.
+impl<S: PageSink> StoredMeshWriter<S> {
+    /// Starts at the start of `sink`, which is empty. All positions are relative to `origin`;
+    /// choose it near the middle.
     ///
     /// # Errors
-    /// When the file cannot be created.
-    pub fn create(
-        path: impl AsRef<Path>,
-        origin: DVec3,
-    ) -> Result<StoredMeshWriter, StoredMeshError> {
+    /// When the sink takes no bytes, and on big-endian machines.
+    pub fn new(sink: S, origin: DVec3) -> Result<StoredMeshWriter<S>, StoredMeshError> {
         if cfg!(target_endian = "big") {
             return Err(StoredMeshError::BigEndian);
         }
-        let path = path.as_ref().to_path_buf();
-        let io = |action, source| StoredMeshError::Io { path: path.clone(), action, source };
-        let mut file = PartialFile::create(&path).map_err(|e| io("create it", e))?;
-        // The header is written last.
-        file.writer.write_all(&[0; HEADER_BYTES]).map_err(|e| io("write", e))?;
+        let mut sink = sink;
+        sink.append(&[0; HEADER_BYTES]).map_err(|reason| unwritable(&sink, reason))?;
         Ok(StoredMeshWriter {
-            path,
-            file,
+            sink,
             origin,
             quality: BuildQuality::Balanced,
             pieces: 0,
@@ -149,7 +138,7 @@ impl StoredMeshWriter {
     /// that cannot be hit are counted, and keep their numbers.
     ///
     /// # Errors
-    /// When the piece is invalid or has another origin, or the file cannot be written.
+    /// When the piece is invalid or has another origin, or the sink takes no bytes.
     pub fn add(&mut self, piece: &MeshSlices<'_>) -> Result<(), StoredMeshError> {
         let number = self.pieces;
         piece.check().map_err(|source| StoredMeshError::Mesh { piece: number, source })?;
@@ -172,11 +161,11 @@ impl StoredMeshWriter {
         self.write(piece)
     }
 
-    /// Writes what waits, the table and the header, and gives the file its name.
+    /// Writes what waits, the table and the header. Returns the sink, and what it has.
     ///
     /// # Errors
-    /// When the file cannot be written, or the coordinates are too large or too small.
-    pub fn finish(mut self) -> Result<StoredMeshReport, StoredMeshError> {
+    /// When the sink takes no bytes, or the coordinates are too large or too small.
+    pub fn finish(mut self) -> Result<(S, StoredMeshReport), StoredMeshError> {
         self.write_waiting()?;
         let reach = self.bounds.min.abs().max(self.bounds.max.abs()).max_element();
         if !self.bounds.is_empty() && LocalFrame::around(self.origin, reach).scale != 1.0 {
@@ -194,18 +183,16 @@ impl StoredMeshWriter {
             bounds: self.bounds,
             table_checksum: checksum(&table),
         };
-        let path = self.path.clone();
-        self.file.finish(&table, &header.bytes(), &path).map_err(|source| StoredMeshError::Io {
-            path,
-            action: "write",
-            source,
-        })?;
-        Ok(StoredMeshReport {
+        let written = self.sink.append(&table);
+        let written = written.and_then(|()| self.sink.replace_start(&header.bytes()));
+        written.map_err(|reason| unwritable(&self.sink, reason))?;
+        let report = StoredMeshReport {
             triangles: header.triangles,
             skipped: header.skipped,
             pages: header.pages,
             bytes: header.length,
-        })
+        };
+        Ok((self.sink, report))
     }
 
     fn write_waiting(&mut self) -> Result<(), StoredMeshError> {
@@ -253,11 +240,7 @@ impl StoredMeshWriter {
             return Err(StoredMeshError::TooManyPages { found: most + 1, most });
         }
         let bytes: &[u8] = bytemuck::cast_slice(&tree.bvh.units);
-        self.file.writer.write_all(bytes).map_err(|source| StoredMeshError::Io {
-            path: self.path.clone(),
-            action: "write",
-            source,
-        })?;
+        self.sink.append(bytes).map_err(|reason| unwritable(&self.sink, reason))?;
         self.table.push(PageEntry {
             offset: self.length,
             first: self.triangles,
@@ -286,40 +269,6 @@ impl Waiting {
     }
 }
 
-/// A file with a name of its own until it is complete; removed when it never is.
-struct PartialFile {
-    writer: BufWriter<File>,
-    path: PathBuf,
-    complete: bool,
-}
-
-impl PartialFile {
-    fn create(path: &Path) -> io::Result<PartialFile> {
-        let invalid = || io::Error::new(io::ErrorKind::InvalidInput, "not the name of a file");
-        let mut name = path.file_name().ok_or_else(invalid)?.to_os_string();
-        // Two processes that write the same file do not share one.
-        name.push(format!(".{}.partial", std::process::id()));
-        let path = path.with_file_name(name);
-        let writer = BufWriter::with_capacity(1 << 20, File::create(&path)?);
-        Ok(PartialFile { writer, path, complete: false })
-    }
-
-    fn finish(&mut self, table: &[u8], header: &[u8], path: &Path) -> io::Result<()> {
-        self.writer.write_all(table)?;
-        self.writer.seek(SeekFrom::Start(0))?;
-        self.writer.write_all(header)?;
-        self.writer.flush()?;
-        std::fs::rename(&self.path, path)?;
-        self.complete = true;
-        Ok(())
-    }
-}
-
-impl Drop for PartialFile {
-    fn drop(&mut self) {
-        if !self.complete {
-            // What failed before has been reported; that the rest stays does not change it.
-            let _ = std::fs::remove_file(&self.path);
-        }
-    }
+fn unwritable(sink: &impl PageSink, reason: String) -> StoredMeshError {
+    StoredMeshError::Io { name: sink.name(), reason }
 }

@@ -1,0 +1,167 @@
+//! Files of stored meshes ([`rt_core::bvh::StoredMesh`]), which may be larger than memory.
+//!
+//! ```
+//! use datasets::stored_mesh;
+//! use rt_core::glam::{DVec3, Vec3};
+//! use rt_core::mesh::MeshSlices;
+//!
+//! # let folder = std::env::temp_dir().join(format!("datasets-stored-{}", std::process::id()));
+//! # std::fs::create_dir_all(&folder)?;
+//! let path = folder.join("plates.rtmesh");
+//! let mut writer = stored_mesh::create(&path, DVec3::ZERO)?;
+//! for piece in 0..3 {
+//!     let z = piece as f32;
+//!     writer.add(&MeshSlices::new(&[0., 0., z, 4., 0., z, 0., 4., z], &[0, 1, 2]))?;
+//! }
+//! assert_eq!(stored_mesh::finish(writer)?.triangles, 3);
+//!
+//! let budget = 64 << 20;
+//! let mesh = stored_mesh::open(&path, budget)?;
+//! assert_eq!(mesh.report().pages, 1);
+//! # std::fs::remove_dir_all(&folder)?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+use glam::DVec3;
+use rt_core::bvh::{
+    PageSink, PageSource, StoredMesh, StoredMeshError, StoredMeshReport, StoredMeshWriter,
+};
+use std::fs::File;
+use std::io::{self, BufWriter, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+/// Opens a file. Parts of it that are in memory take at most `budget` bytes: see
+/// [`StoredMesh::open`].
+///
+/// # Errors
+/// When the file cannot be read, is no stored mesh, has another version, was cut, or is damaged.
+pub fn open(path: &Path, budget: usize) -> Result<StoredMesh, StoredMeshError> {
+    let file = File::open(path).map_err(|e| error(path, "cannot open it", &e))?;
+    StoredMesh::open(OpenFile { file, path: path.to_path_buf() }, budget)
+}
+
+/// Starts a file, whose positions are relative to `origin`. It has another name, which ends in
+/// `.partial`, until [`finish`], and is removed when that never comes.
+///
+/// # Errors
+/// When the file cannot be created.
+pub fn create(
+    path: &Path,
+    origin: DVec3,
+) -> Result<StoredMeshWriter<StoredMeshFile>, StoredMeshError> {
+    let file = StoredMeshFile::create(path).map_err(|e| error(path, "cannot create it", &e))?;
+    StoredMeshWriter::new(file, origin)
+}
+
+/// Completes a file and gives it its name.
+///
+/// # Errors
+/// When the file cannot be written or renamed, or the mesh cannot be stored.
+pub fn finish(
+    writer: StoredMeshWriter<StoredMeshFile>,
+) -> Result<StoredMeshReport, StoredMeshError> {
+    let (mut file, report) = writer.finish()?;
+    file.complete().map_err(|e| error(&file.path, "cannot write it", &e))?;
+    Ok(report)
+}
+
+fn error(path: &Path, action: &str, source: &io::Error) -> StoredMeshError {
+    let name = path.display().to_string();
+    StoredMeshError::Io { name, reason: format!("{action}: {source}") }
+}
+
+/// A file that is read at any place by several threads.
+struct OpenFile {
+    file: File,
+    path: PathBuf,
+}
+
+impl PageSource for OpenFile {
+    fn name(&self) -> String {
+        self.path.display().to_string()
+    }
+
+    fn length(&self) -> Result<u64, String> {
+        self.file.metadata().map(|m| m.len()).map_err(|e| format!("cannot look at it: {e}"))
+    }
+
+    fn read(&self, offset: u64, bytes: &mut [u8]) -> Result<(), String> {
+        let length = bytes.len();
+        read_at(&self.file, bytes, offset)
+            .map_err(|e| format!("cannot read {length} bytes from byte {offset} on: {e}"))
+    }
+}
+
+/// Reads all of `bytes` from `offset` on, without a position that threads would share.
+#[cfg(unix)]
+fn read_at(file: &File, bytes: &mut [u8], offset: u64) -> io::Result<()> {
+    std::os::unix::fs::FileExt::read_exact_at(file, bytes, offset)
+}
+
+/// Reads all of `bytes` from `offset` on, without a position that threads would share.
+#[cfg(windows)]
+fn read_at(file: &File, mut bytes: &mut [u8], mut offset: u64) -> io::Result<()> {
+    while !bytes.is_empty() {
+        let read = std::os::windows::fs::FileExt::seek_read(file, bytes, offset)?;
+        if read == 0 {
+            return Err(io::ErrorKind::UnexpectedEof.into());
+        }
+        bytes = &mut bytes[read..];
+        offset += read as u64;
+    }
+    Ok(())
+}
+
+/// A file with a name of its own until it is complete.
+pub struct StoredMeshFile {
+    writer: BufWriter<File>,
+    /// The name that it gets.
+    path: PathBuf,
+    partial: PathBuf,
+    complete: bool,
+}
+
+impl StoredMeshFile {
+    fn create(path: &Path) -> io::Result<StoredMeshFile> {
+        let invalid = || io::Error::new(io::ErrorKind::InvalidInput, "not the name of a file");
+        let mut name = path.file_name().ok_or_else(invalid)?.to_os_string();
+        // Two processes that write the same file do not share one.
+        name.push(format!(".{}.partial", std::process::id()));
+        let partial = path.with_file_name(name);
+        let writer = BufWriter::with_capacity(1 << 20, File::create(&partial)?);
+        Ok(StoredMeshFile { writer, path: path.to_path_buf(), partial, complete: false })
+    }
+
+    fn complete(&mut self) -> io::Result<()> {
+        self.writer.flush()?;
+        std::fs::rename(&self.partial, &self.path)?;
+        self.complete = true;
+        Ok(())
+    }
+}
+
+impl PageSink for StoredMeshFile {
+    fn name(&self) -> String {
+        self.path.display().to_string()
+    }
+
+    fn append(&mut self, bytes: &[u8]) -> Result<(), String> {
+        self.writer.write_all(bytes).map_err(|e| format!("cannot write it: {e}"))
+    }
+
+    fn replace_start(&mut self, bytes: &[u8]) -> Result<(), String> {
+        let start = self.writer.seek(SeekFrom::Start(0));
+        start
+            .and_then(|_| self.writer.write_all(bytes))
+            .map_err(|e| format!("cannot write it: {e}"))
+    }
+}
+
+impl Drop for StoredMeshFile {
+    fn drop(&mut self) {
+        if !self.complete {
+            // What failed before has been reported; that the rest stays does not change it.
+            let _ = std::fs::remove_file(&self.partial);
+        }
+    }
+}
