@@ -16,7 +16,8 @@ use rt_core::effects::Effects;
 use rt_core::frame::Frame;
 use rt_core::glam::Vec3;
 use rt_core::math::Aabb;
-use rt_core::render::RenderOptions;
+use rt_core::render::{RenderError, RenderOptions};
+use rt_core::scene::Scene;
 use std::sync::Arc;
 
 /// One rank of a group that renders a scene in parts.
@@ -219,6 +220,7 @@ impl DataParallel {
                     TileCollector::new(channel, &side, &owners, &mut tiles, self.options.root)?;
                 primary_rays::run(channel, &side, &owners, wanted, Some(&mut collect))?;
                 let picture = collect.into_picture();
+                readable(&part.scene)?;
                 for tile in &tiles {
                     channel.report.rays += tile.stats();
                 }
@@ -249,6 +251,8 @@ impl DataParallel {
             };
             wave.run(channel, &mut tiles, answers)?;
         }
+        // Before this rank's tiles are sent, so that no rank takes the frame for right.
+        readable(&part.scene)?;
         for tile in &tiles {
             channel.report.rays += tile.stats();
         }
@@ -304,5 +308,13 @@ impl DataParallel {
         let decision = self.decision.as_ref();
         channel.report.secondary_rays = decision.map(|c| c.reason.clone()).unwrap_or_default();
         Ok(decision.map_or(SecondaryRayPolicy::Forward, |c| c.policy))
+    }
+}
+
+/// Whether all shapes of a rank could read their data. Else what its rays passed through is unknown.
+fn readable(scene: &Scene) -> Result<(), FrameError> {
+    match scene.world.failure() {
+        Some((geometry, reason)) => Err(RenderError::Unreadable { geometry, reason }.into()),
+        None => Ok(()),
     }
 }

@@ -2,6 +2,7 @@
 mod distributed;
 mod lying_ranks;
 mod scenes;
+mod unreadable_shapes;
 mod volumes;
 
 use composite::comm::sim;
