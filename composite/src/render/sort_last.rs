@@ -311,7 +311,8 @@ impl DataParallel {
     }
 }
 
-/// Whether all shapes of a rank could read their data. Else what its rays passed through is unknown.
+/// Whether all shapes of a rank could read their data. Else nobody knows what its rays passed
+/// through.
 fn readable(scene: &Scene) -> Result<(), FrameError> {
     match scene.world.failure() {
         Some((geometry, reason)) => Err(RenderError::Unreadable { geometry, reason }.into()),
