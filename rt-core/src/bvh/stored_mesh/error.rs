@@ -80,7 +80,7 @@ pub enum StoredMeshError {
         piece: u64,
         /// Its origin.
         found: DVec3,
-        /// The origin given to [`super::StoredMeshWriter::create`].
+        /// The origin given to [`super::StoredMeshWriter::new`].
         expected: DVec3,
     },
     /// Coordinates are too large or too small for the triangle test.
