@@ -125,9 +125,9 @@ struct RenderArgs {
     /// The image as OpenEXR: colour, depth, distance, normal, ids, rays per pixel
     #[arg(long, value_name = "EXR")]
     exr: Option<PathBuf>,
-    /// Megabytes for the parts of a stored mesh that are in memory at a time
-    #[arg(long, value_name = "MB", default_value_t = 1024)]
-    memory: u64,
+    /// Megabytes for the parts of a stored mesh that are in memory at a time [default: 1024]
+    #[arg(long, value_name = "MB")]
+    memory: Option<u64>,
     /// Pixels per row and rows
     #[arg(long, default_value = "960x540", value_name = "WxH", value_parser = render::size)]
     size: [u32; 2],

@@ -3,10 +3,13 @@
 use super::RenderArgs;
 use crate::image::subject::{LoadOptions, VolumeChoice};
 use datasets::cli::UsageError;
-use rt_core::bvh::StoredMesh;
+use rt_core::bvh::{Robustness, Storage, StoredMesh};
 use serde_json::{Value, json};
 use std::io::Read as _;
 use std::sync::Arc;
+
+/// Megabytes for pages, unless the user gives others.
+const DEFAULT_MEMORY: u64 = 1024;
 
 /// The file as a stored mesh, when it is one.
 pub(super) fn open(
@@ -16,7 +19,15 @@ pub(super) fn open(
     let mut start = [0; 8];
     // Folders and files that cannot be read are the readers' to report.
     let read = std::fs::File::open(&args.file).and_then(|mut file| file.read_exact(&mut start));
+    let file = args.file.display();
     if read.is_err() || !StoredMesh::recognizes(&start) {
+        if args.memory.is_some() {
+            return Err(UsageError(format!(
+                "--memory belongs to a stored mesh, and {file} is none; leave it out, or make one \
+                 with `bench store {file} -o FILE.rtmesh`"
+            ))
+            .into());
+        }
         return Ok(None);
     }
     let without_effect = [
@@ -24,15 +35,18 @@ pub(super) fn open(
         ("--isovalue", options.isovalue.is_some()),
         ("--volume", options.volume != VolumeChoice::No),
         ("--range", args.range.is_some()),
+        ("--storage", args.storage != Storage::Plain),
+        ("--robustness", args.robustness != Robustness::Watertight),
     ];
     if let Some((option, _)) = without_effect.iter().find(|(_, given)| *given) {
-        let file = args.file.display();
         return Err(UsageError(format!(
-            "{option} has no effect on {file}, which holds triangles alone; leave it out"
+            "{option} has no effect on {file}: a stored mesh has triangles alone, compact and \
+             watertight; leave it out"
         ))
         .into());
     }
-    let memory = usize::try_from(args.memory).unwrap_or(usize::MAX).saturating_mul(1 << 20);
+    let memory = args.memory.unwrap_or(DEFAULT_MEMORY);
+    let memory = usize::try_from(memory).unwrap_or(usize::MAX).saturating_mul(1 << 20);
     Ok(Some(Arc::new(datasets::stored_mesh::open(&args.file, memory)?)))
 }
 

@@ -114,10 +114,11 @@ impl PageCache {
         *held = Some(page.clone());
         self.reads.fetch_add(1, Ordering::Relaxed);
         let bytes = self.bytes.fetch_add(page.bytes(), Ordering::Relaxed) + page.bytes();
+        // Before others leave: both are in memory now.
+        self.peak.fetch_max(bytes, Ordering::Relaxed);
         let mut queue = lock(&self.queue);
         queue.push_back(number);
         self.make_room(&mut queue, bytes);
-        self.peak.fetch_max(self.bytes.load(Ordering::Relaxed), Ordering::Relaxed);
         Some(page)
     }
 
