@@ -239,3 +239,35 @@ fn ctrl_c_within_an_image_keeps_its_samples_and_ends_with_130() {
     );
     assert_eq!(read_png(&png).unwrap().width, 64);
 }
+
+#[test]
+fn a_stored_mesh_is_drawn_and_refuses_what_it_cannot_honour() {
+    let dir = tempfile::tempdir().unwrap();
+    let of = |name: &str| dir.path().join(name).display().to_string();
+    let (ply, stored, png) = (of("ball.ply"), of("ball.rtmesh"), of("ball.png"));
+    write_ply(Path::new(&ply), &ball()).unwrap();
+    let made = bench(&["store", &ply, "-o", &stored, "--json"]);
+    let said: Value = serde_json::from_slice(&made.stdout).unwrap();
+    assert_eq!(said["triangles"], ball().num_triangles());
+    let warned = String::from_utf8_lossy(&made.stderr).into_owned();
+    assert!(warned.contains("colours and scalars are not stored"), "{warned}");
+
+    let drawn = bench(&["render", &stored, "-o", &png, "--size", "64x64", "--json"]);
+    assert!(drawn.status.success(), "{}", String::from_utf8_lossy(&drawn.stderr));
+    let said: Value = serde_json::from_slice(&drawn.stdout).unwrap();
+    assert!(said["stored"]["page_reads"].as_u64().unwrap() >= 1, "{said}");
+    assert_eq!(said["triangles"], ball().num_triangles());
+    let pixels = read_png(Path::new(&png)).unwrap().rgba().unwrap();
+    assert!(pixels.iter().filter(|c| **c != pixels[0]).count() > 500);
+
+    let refused = |args: &[&str], word: &str| {
+        let out = bench(&[&["render"], args, &["-o", png.as_str()]].concat());
+        let text = String::from_utf8_lossy(&out.stderr).into_owned();
+        assert_eq!(out.status.code(), Some(2), "{args:?}: {text}");
+        assert!(text.contains(word) && text.contains("leave it out"), "{args:?}: {text}");
+    };
+    refused(&[&stored, "--storage", "compact"], "--storage");
+    refused(&[&stored, "--robustness", "fast"], "--robustness");
+    refused(&[&stored, "--color-by", "z"], "--color-by");
+    refused(&[&ply, "--memory", "5"], "--memory");
+}

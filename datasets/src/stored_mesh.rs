@@ -22,12 +22,13 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+use crate::atomic_file::PartialFile;
 use glam::DVec3;
 use rt_core::bvh::{
     PageSink, PageSource, StoredMesh, StoredMeshError, StoredMeshReport, StoredMeshWriter,
 };
 use std::fs::File;
-use std::io::{self, BufWriter, Seek, SeekFrom, Write};
+use std::io::{self, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 /// Opens a file. Parts of it that are in memory take at most `budget` bytes: see
@@ -49,8 +50,8 @@ pub fn create(
     path: &Path,
     origin: DVec3,
 ) -> Result<StoredMeshWriter<StoredMeshFile>, StoredMeshError> {
-    let file = StoredMeshFile::create(path).map_err(|e| error(path, "cannot create it", &e))?;
-    StoredMeshWriter::new(file, origin)
+    let file = PartialFile::create(path).map_err(|e| error(path, "cannot create it", &e))?;
+    StoredMeshWriter::new(StoredMeshFile(file), origin)
 }
 
 /// Completes a file and gives it its name.
@@ -60,7 +61,7 @@ pub fn create(
 pub fn finish(
     writer: StoredMeshWriter<StoredMeshFile>,
 ) -> Result<StoredMeshReport, StoredMeshError> {
-    let (mut file, report) = writer.finish()?;
+    let (StoredMeshFile(mut file), report) = writer.finish()?;
     file.complete().map_err(|e| error(&file.path, "cannot write it", &e))?;
     Ok(report)
 }
@@ -112,56 +113,22 @@ fn read_at(file: &File, mut bytes: &mut [u8], mut offset: u64) -> io::Result<()>
     Ok(())
 }
 
-/// A file with a name of its own until it is complete.
-pub struct StoredMeshFile {
-    writer: BufWriter<File>,
-    /// The name that it gets.
-    path: PathBuf,
-    partial: PathBuf,
-    complete: bool,
-}
-
-impl StoredMeshFile {
-    fn create(path: &Path) -> io::Result<StoredMeshFile> {
-        let invalid = || io::Error::new(io::ErrorKind::InvalidInput, "not the name of a file");
-        let mut name = path.file_name().ok_or_else(invalid)?.to_os_string();
-        // Two processes that write the same file do not share one.
-        name.push(format!(".{}.partial", std::process::id()));
-        let partial = path.with_file_name(name);
-        let writer = BufWriter::with_capacity(1 << 20, File::create(&partial)?);
-        Ok(StoredMeshFile { writer, path: path.to_path_buf(), partial, complete: false })
-    }
-
-    fn complete(&mut self) -> io::Result<()> {
-        self.writer.flush()?;
-        std::fs::rename(&self.partial, &self.path)?;
-        self.complete = true;
-        Ok(())
-    }
-}
+/// A file that gets its name when it is complete.
+pub struct StoredMeshFile(PartialFile);
 
 impl PageSink for StoredMeshFile {
     fn name(&self) -> String {
-        self.path.display().to_string()
+        self.0.path.display().to_string()
     }
 
     fn append(&mut self, bytes: &[u8]) -> Result<(), String> {
-        self.writer.write_all(bytes).map_err(|e| format!("cannot write it: {e}"))
+        self.0.writer.write_all(bytes).map_err(|e| format!("cannot write it: {e}"))
     }
 
     fn replace_start(&mut self, bytes: &[u8]) -> Result<(), String> {
-        let start = self.writer.seek(SeekFrom::Start(0));
+        let start = self.0.writer.seek(SeekFrom::Start(0));
         start
-            .and_then(|_| self.writer.write_all(bytes))
+            .and_then(|_| self.0.writer.write_all(bytes))
             .map_err(|e| format!("cannot write it: {e}"))
-    }
-}
-
-impl Drop for StoredMeshFile {
-    fn drop(&mut self) {
-        if !self.complete {
-            // What failed before has been reported; that the rest stays does not change it.
-            let _ = std::fs::remove_file(&self.partial);
-        }
     }
 }

@@ -49,7 +49,7 @@ pub(super) fn read_mesh(common: CommonArgs, file: &Path) -> anyhow::Result<MeshS
 }
 
 /// The meshes relative to the origin of the first, and how many had another one.
-fn with_one_origin(meshes: Vec<Arc<TriMesh>>) -> (Vec<Arc<TriMesh>>, usize) {
+pub(super) fn with_one_origin(meshes: Vec<Arc<TriMesh>>) -> (Vec<Arc<TriMesh>>, usize) {
     let Some(origin) = meshes.first().map(|m| m.origin) else { return (meshes, 0) };
     let mut moved = 0;
     let move_one = |mesh: Arc<TriMesh>| {

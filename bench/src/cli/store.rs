@@ -1,16 +1,17 @@
 //! `bench store`: writes meshes to files that are larger than memory.
 
 use super::StoreArgs;
+use super::mesh_file::with_one_origin;
 use crate::image::subject::{LoadOptions, Subject};
 use anyhow::Context as _;
 use datasets::cli::{Cancel, CommonArgs, CureExt as _, UsageError};
 use datasets::generate::nested_wavelet::{POINTS, isovalues_for};
 use datasets::generate::wavelet::Wavelet;
 use datasets::isosurface::{self, Options};
-use datasets::stored_mesh::{self, StoredMeshFile};
-use rt_core::bvh::{Geometry, StoredMeshReport, StoredMeshWriter};
+use datasets::stored_mesh;
+use rt_core::bvh::{Geometry, StoredMeshReport};
 use rt_core::glam::DVec3;
-use rt_core::mesh::{MeshSlices, TriMesh};
+use rt_core::mesh::MeshSlices;
 use serde_json::json;
 use std::time::Instant;
 
@@ -74,7 +75,7 @@ fn store_file(
         common.warn(format_args!("{shown}: {warning}"));
     }
     let all = subject.parts.len();
-    let mut meshes: Vec<_> = subject
+    let meshes: Vec<_> = subject
         .parts
         .into_iter()
         .filter_map(|part| match part.geometry {
@@ -94,30 +95,19 @@ fn store_file(
         common.warn(format_args!("{shown}: colours and scalars are not stored"));
     }
     let origin = first.origin;
+    let (meshes, moved) = with_one_origin(meshes);
+    if moved > 0 {
+        common.note(0, format_args!("{shown}: {moved} meshes moved to the origin of the first"));
+    }
     let mut writer = stored_mesh::create(&args.out, origin)?;
     writer.set_memory(memory);
     let bar = common.progress(meshes.len() as u64, "storing");
-    for (number, mesh) in meshes.drain(..).enumerate() {
+    for (number, mesh) in meshes.into_iter().enumerate() {
         cancel.check()?;
-        add(&mut writer, &mesh, origin)?;
+        writer.add(&MeshSlices::of_mesh(&mesh))?;
         bar.set_position(number as u64 + 1);
     }
     Ok(stored_mesh::finish(writer)?)
-}
-
-/// Adds a mesh, moved where it has another origin.
-fn add(
-    writer: &mut StoredMeshWriter<StoredMeshFile>,
-    mesh: &TriMesh,
-    origin: DVec3,
-) -> anyhow::Result<()> {
-    if mesh.origin == origin {
-        return Ok(writer.add(&MeshSlices::of_mesh(mesh))?);
-    }
-    let shift = mesh.origin - origin;
-    let positions = mesh.positions.iter().map(|p| (p.as_dvec3() + shift).as_vec3()).collect();
-    let moved = TriMesh { origin, ..TriMesh::new(positions, mesh.indices.clone()) };
-    Ok(writer.add(&MeshSlices::of_mesh(&moved))?)
 }
 
 /// Nested isosurfaces of the wavelet, one after the other: the dissertation's scaling series
@@ -138,7 +128,7 @@ fn store_wavelet(
         cancel.check()?;
         let surface = isosurface::extract(&grid, &[*isovalue], Options::default())
             .cure("give --wavelet fewer millions")?;
-        add(&mut writer, &surface.mesh, DVec3::ZERO)?;
+        writer.add(&MeshSlices::of_mesh(&surface.mesh))?;
         bar.set_position(number as u64 + 1);
     }
     Ok(stored_mesh::finish(writer)?)
