@@ -244,9 +244,10 @@ fn ctrl_c_within_an_image_keeps_its_samples_and_ends_with_130() {
 fn a_stored_mesh_is_drawn_and_refuses_what_it_cannot_honour() {
     let dir = tempfile::tempdir().unwrap();
     let of = |name: &str| dir.path().join(name).display().to_string();
-    let (ply, stored, png) = (of("ball.ply"), of("ball.rtmesh"), of("ball.png"));
-    write_ply(Path::new(&ply), &ball()).unwrap();
-    let made = bench(&["store", &ply, "-o", &stored, "--json"]);
+    let (stored, png) = (of("ball.rtmesh"), of("ball.png"));
+    files(dir.path());
+    let (glb, ply) = (of("ball.glb"), of("ball.ply"));
+    let made = bench(&["store", &glb, "-o", &stored, "--json"]);
     let said: Value = serde_json::from_slice(&made.stdout).unwrap();
     assert_eq!(said["triangles"], ball().num_triangles());
     let warned = String::from_utf8_lossy(&made.stderr).into_owned();

@@ -43,7 +43,8 @@ enum Command {
     Quote,
     /// Renders a file: meshes, isosurfaces of image data, lines as tubes, points as spheres
     Render(RenderArgs),
-    /// Writes a mesh to a file that `bench render` draws without reading all of it
+    /// Writes the triangles of a file, without colours, scalars and normals, to one that `bench
+    /// render` draws without reading all of it
     #[command(after_help = store::EXAMPLES)]
     Store(StoreArgs),
     /// Renders one of the report's images of generated data
