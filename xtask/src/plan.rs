@@ -138,8 +138,8 @@ pub(crate) const STEPS: &[Step] = &[
     },
     Step {
         name: "wheels",
-        tells: "the Python packages rt_core and schlieren install in fresh environments with numpy \
-                alone, and pass their tests and the examples of their documentation there",
+        tells: "the Python package installs in fresh environments with numpy alone, and passes its \
+                tests and the examples of its documentation there",
         action: Action::Call(wheels::check),
     },
     Step {

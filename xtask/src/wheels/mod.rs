@@ -88,10 +88,8 @@ pub(crate) fn check(context: &Context<'_>) -> Outcome {
         return Outcome::NotRun("it installs packages from PyPI, which was forbidden".to_owned());
     }
     let build = main_job::build_folder(context.root, crate::build_folder_named());
-    // rtvtk's library is built once more for its wheel, with other features than the tests have:
-    // `cargo xtask wheels --package rtvtk` makes and tests it.
-    let packages = PACKAGES.iter().filter(|package| package.name != "rtvtk").copied().collect();
-    let options = WheelsOptions { profile: "dev".to_owned(), out: None, packages };
+    let options =
+        WheelsOptions { profile: "dev".to_owned(), out: None, packages: PACKAGES.to_vec() };
     match run(context.root, &build, &options) {
         Ok(()) => Outcome::Passed,
         Err(why) => Outcome::Failed(why),
