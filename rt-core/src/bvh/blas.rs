@@ -6,7 +6,7 @@
 //! that start near the geometry have small coordinates, and products of three lengths in the
 //! triangle test neither overflow nor underflow.
 
-use super::build::{PrimRef, Progress, Stopped, build_wide};
+use super::build::{LeafCapacity, PrimRef, Progress, Stopped, build_wide};
 use super::compact::CompactBvh;
 use super::layout::id_leaf::{IdWriter, leaf_primitive_ids};
 use super::layout::local_frame::LocalFrame;
@@ -106,7 +106,11 @@ impl Blas {
         progress.check()?;
         let primitives = refs.len();
         let mut notes = Vec::new();
-        let bvh = build_wide(refs, &IdWriter, options.quality.config(), &mut notes, progress)?;
+        let mut config = options.quality.config();
+        if shape.is_costly() {
+            config.sah.leaves = LeafCapacity::One;
+        }
+        let bvh = build_wide(refs, &IdWriter, config, &mut notes, progress)?;
         let frame = LocalFrame { center: shape.origin(), scale: 1.0 };
         Ok(Blas {
             frame,

@@ -102,6 +102,12 @@ pub trait Shape: Send + Sync {
         None
     }
 
+    /// Whether a ray takes much longer for a primitive than for its box. Then each has a leaf of
+    /// the tree to itself; else up to four share one, and are tested without their boxes.
+    fn is_costly(&self) -> bool {
+        false
+    }
+
     /// Why answers since the shape was made may be wrong, for a shape whose data can become
     /// unreadable (in a file, for example): what it was, and what to do. A render that finds one
     /// at its end fails with it.

@@ -52,6 +52,10 @@ impl Shape for ShapePart {
         self.shape.has_transparency()
     }
 
+    fn is_costly(&self) -> bool {
+        self.shape.is_costly()
+    }
+
     fn failure(&self) -> Option<String> {
         self.shape.failure()
     }

@@ -10,7 +10,6 @@ use super::format::{
 use super::page::{Page, PageHit};
 use crate::bvh::compact::new_key;
 use crate::bvh::layout::wide::Unit;
-use crate::bvh::traverse::single::{BOX_SLACK, safe_reciprocal};
 use crate::math::Aabb;
 use crate::ray::Ray;
 use crate::shapes::{Shape, ShapeHit, ShapeSurface, rounded_point};
@@ -161,18 +160,6 @@ fn damaged(source: &dyn PageSource, part: &str, offset: u64, reason: &str) -> St
     StoredMeshError::Damaged { name, part, offset, reason }
 }
 
-/// Whether a ray enters a box, which is wider than what it holds. As the traversal's test.
-fn enters(ray: &Ray, b: Aabb) -> bool {
-    let (mut near, mut far) = (ray.t_min, ray.t_max);
-    for axis in 0..3 {
-        let rcp = safe_reciprocal(ray.dir[axis]);
-        let [t1, t2] = [b.min[axis], b.max[axis]].map(|x| (x - ray.origin[axis]) * rcp);
-        near = near.max(t1.min(t2));
-        far = far.min(t1.max(t2) * BOX_SLACK);
-    }
-    near <= far
-}
-
 impl Shape for StoredMesh {
     fn num_primitives(&self) -> usize {
         self.table.len()
@@ -187,16 +174,12 @@ impl Shape for StoredMesh {
     }
 
     fn closest(&self, page: u32, ray: &Ray) -> Option<ShapeHit> {
-        if !enters(ray, self.table[page as usize].bounds) {
-            return None;
-        }
         let hit = self.with_page(page, |page| page.closest(self.level, ray)).flatten()?;
         Some(ShapeHit { t: hit.t, u: hit.u, v: hit.v })
     }
 
     fn occluded(&self, page: u32, ray: &Ray) -> bool {
-        enters(ray, self.table[page as usize].bounds)
-            && self.with_page(page, |page| page.occluded(self.level, ray)).unwrap_or(false)
+        self.with_page(page, |page| page.occluded(self.level, ray)).unwrap_or(false)
     }
 
     fn surface(&self, page: u32, hit: &ShapeHit, ray: &Ray) -> ShapeSurface {
@@ -207,7 +190,10 @@ impl Shape for StoredMesh {
             scalar: None,
             color: None,
         };
-        let Some(PageHit { corners, .. }) = self.hit(page, ray) else {
+        // The same hit by a ray that ends there: it meets few boxes.
+        let to_hit = Ray { t_min: hit.t, t_max: hit.t.next_up(), ..*ray };
+        let found = self.hit(page, &to_hit).or_else(|| self.hit(page, ray));
+        let Some(PageHit { corners, .. }) = found else {
             // The page could be read for the hit and cannot be read now: the render fails.
             return flat(ray.at(hit.t), 0.0, -ray.dir.normalize_or_zero());
         };
@@ -218,6 +204,10 @@ impl Shape for StoredMesh {
         let size = corners.iter().fold(0.0f32, |m, p| m.max(p.abs().max_element()));
         let (point, point_error) = rounded_point(p, 16.0 * f64::EPSILON * f64::from(size));
         flat(point, point_error, e1.cross(e2).normalize_or_zero().as_vec3())
+    }
+
+    fn is_costly(&self) -> bool {
+        true
     }
 
     fn failure(&self) -> Option<String> {
