@@ -11,7 +11,7 @@ use super::compact::CompactBvh;
 use super::layout::id_leaf::{IdWriter, leaf_primitive_ids};
 use super::layout::local_frame::LocalFrame;
 use super::layout::triangles::widened;
-use super::layout::wide::{ChildRef, Unit, WideBvh};
+use super::layout::wide::{ChildRef, LEAF_SIZE, Unit, WideBvh};
 use super::options::{BuildOptions, Storage};
 use super::query::{AnyHit, ClosestHit, TriangleTest};
 use super::traverse::tree_view::TreeView;
@@ -107,10 +107,12 @@ impl Blas {
         let primitives = refs.len();
         let mut notes = Vec::new();
         let mut config = options.quality.config();
-        if shape.is_costly() {
+        let bvh = if shape.is_costly() {
             config.sah.leaves = LeafCapacity::One;
-        }
-        let bvh = build_wide(refs, &IdWriter, config, &mut notes, progress)?;
+            build_wide(refs, &IdWriter::<1>, config, &mut notes, progress)?
+        } else {
+            build_wide(refs, &IdWriter::<LEAF_SIZE>, config, &mut notes, progress)?
+        };
         let frame = LocalFrame { center: shape.origin(), scale: 1.0 };
         Ok(Blas {
             frame,

@@ -7,6 +7,7 @@ use super::sah_tree::sah_tree;
 use super::*;
 use crate::bvh::brute_force;
 use crate::bvh::layout::id_leaf::IdWriter;
+use crate::bvh::layout::wide::LEAF_SIZE;
 use crate::bvh::{BuildOptions, BuildQuality, TreeStats, World};
 use crate::math::Aabb;
 use crate::mesh::TriMesh;
@@ -262,7 +263,8 @@ fn what_obvhs_cannot_take_is_built_by_sah_and_noted() {
     refs.sort_unstable_by_key(PrimRef::id);
     let config = BuilderConfig { method: Method::Reinsertion, sah: THOROUGH };
     let mut notes = Vec::new();
-    let bvh = build_wide(refs.clone(), &IdWriter, config, &mut notes, &UNWATCHED).unwrap();
+    let bvh =
+        build_wide(refs.clone(), &IdWriter::<LEAF_SIZE>, config, &mut notes, &UNWATCHED).unwrap();
     assert_eq!(notes.len(), 1, "{notes:?}");
     assert!(notes[0].contains("surface area heuristic"), "{notes:?}");
     assert!(bvh.units.len() > refs.len() / 4, "{}", bvh.units.len());

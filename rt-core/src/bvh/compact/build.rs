@@ -15,7 +15,7 @@ use crate::bvh::layout::id_leaf::IdWriter;
 use crate::bvh::layout::local_frame::LocalFrame;
 use crate::bvh::layout::triangles::TriWriter;
 use crate::bvh::layout::wide::{
-    CHILD_ROW, ChildRef, LeafWriter, MAX_DEPTH, NODE_UNITS, Unit, WideBvh,
+    CHILD_ROW, ChildRef, LEAF_SIZE, LeafWriter, MAX_DEPTH, NODE_UNITS, Unit, WideBvh,
 };
 use crate::bvh::options::BuildQuality;
 use crate::math::Aabb;
@@ -80,7 +80,8 @@ impl CompactBvh {
             }
             let refs = piece.par_iter().with_min_len(1 << 12);
             let refs: Vec<PrimRef> = refs.map(|&i| PrimRef::new(triangles.bounds(i), i)).collect();
-            let tree = build_wide(refs, &IdWriter, quality.config(), &mut notes, progress)?;
+            let tree =
+                build_wide(refs, &IdWriter::<LEAF_SIZE>, quality.config(), &mut notes, progress)?;
             let parts = parts(&tree);
             drop(tree);
             append(&parts, triangles, &mut units, &mut placed);

@@ -2,11 +2,13 @@
 
 use super::wide::{ChildRef, LeafWriter, Unit, write_id_leaf};
 
-/// Writes the numbers.
-pub(crate) struct IdWriter;
+/// Writes at most `MOST` numbers into a leaf.
+pub(crate) struct IdWriter<const MOST: usize>;
 
-impl LeafWriter for IdWriter {
+impl<const MOST: usize> LeafWriter for IdWriter<MOST> {
     const UNITS: usize = 1;
+    const CAPACITY: usize = MOST;
+
     fn write(&self, prims: &[u32], out: &mut [Unit]) {
         write_id_leaf(out, prims.iter().copied());
     }
