@@ -91,7 +91,12 @@ struct StoreArgs {
     #[arg(required_unless_present = "wavelet")]
     file: Option<PathBuf>,
     /// Instead of a file: nested isosurfaces of VTK's wavelet, with so many million triangles
-    #[arg(long, value_name = "MILLIONS", conflicts_with = "file", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    #[arg(
+        long,
+        value_name = "MILLIONS",
+        conflicts_with = "file",
+        value_parser = clap::value_parser!(u32).range(1..=100_000)
+    )]
     wavelet: Option<u32>,
     /// The file to write (.rtmesh)
     #[arg(long, short, value_name = "FILE")]
@@ -100,7 +105,12 @@ struct StoreArgs {
     #[arg(long, value_name = "VALUE", allow_hyphen_values = true, requires = "file")]
     isovalue: Option<f32>,
     /// Megabytes that small pieces may take before they are written. More make faster files
-    #[arg(long, value_name = "MB", default_value_t = 1024, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(
+        long,
+        value_name = "MB",
+        default_value_t = 1024,
+        value_parser = clap::value_parser!(u64).range(1..)
+    )]
     memory: u64,
 }
 

@@ -8,6 +8,7 @@ use crate::media::Bend;
 use crate::path::{Exit, LightPaths, PathQuantities};
 use crate::plan::{compare, sample_starts};
 use crate::view::View;
+use std::collections::BTreeMap;
 
 /// Numbers of steps in each cell that are tried.
 const STEPS: [u32; 3] = [1, 2, 4];
@@ -32,8 +33,13 @@ pub(super) fn planned(
             OnCells::new(gas, view, quantities, steps).trace_parallel(&starts, &mut exits);
             exits
         };
+        // Four steps measure one, and are measured themselves.
+        let mut traced = BTreeMap::new();
         for tried in STEPS {
-            let (max_rad, _, _) = compare(&trace(tried), &trace(FINER * tried));
+            for steps in [tried, FINER * tried] {
+                traced.entry(steps).or_insert_with(|| trace(steps));
+            }
+            let (max_rad, _, _) = compare(&traced[&tried], &traced[&(FINER * tried)]);
             (steps, error_rad) = (tried, Some(max_rad));
             if max_rad <= tolerance_rad {
                 break;
