@@ -115,10 +115,7 @@ fn tested(
     let parts = suite.parts.iter().filter(|p| !p.paraview || paraview);
     let mut skipped = Vec::new();
     for part in parts {
-        let program = programs
-            .iter()
-            .find(|p| named(p, part.test))
-            .ok_or_else(|| format!("cargo built no test program {}", part.test))?;
+        let program = test_program(&programs, part.test)?;
         let output = chroot.run(program, part)?;
         let tested = Tested::read(&output);
         faults.extend(tested.faults(part.test, suite.known));
@@ -169,6 +166,16 @@ fn executables(text: &str) -> Programs {
     lines.filter_map(|l| Some(l.rsplit_once('(')?.1.strip_suffix(')')?.into())).collect()
 }
 
+/// The one test program of this name. Two members may have one each, and cargo does not say whose.
+fn test_program<'a>(programs: &'a Programs, name: &str) -> Result<&'a PathBuf, String> {
+    let found: Vec<&PathBuf> = programs.iter().filter(|p| named(p, name)).collect();
+    match found[..] {
+        [program] => Ok(program),
+        [] => Err(format!("cargo built no test program {name}")),
+        _ => Err(format!("{} members have a test program {name}: rename one", found.len())),
+    }
+}
+
 /// Whether `program` is cargo's file of the test `name`: `name-0123456789abcdef`.
 fn named(program: &Path, name: &str) -> bool {
     let file = program.file_name().unwrap_or_default().to_string_lossy();
@@ -188,6 +195,14 @@ mod tests {
         assert_eq!(found.len(), 2, "{found:?}");
         assert!(named(&found[1], "programs") && !named(&found[1], "program"));
         assert!(named(Path::new("/t/against_stock-77"), "against_stock"));
+    }
+
+    #[test]
+    fn two_test_programs_of_one_name_are_not_taken_for_each_other() {
+        let programs = ["/t/programs-01", "/t/programs-02", "/t/traps-03"].map(Into::into).into();
+        assert!(test_program(&programs, "programs").unwrap_err().starts_with("2 members"));
+        assert_eq!(test_program(&programs, "traps").unwrap(), Path::new("/t/traps-03"));
+        assert!(test_program(&programs, "modes").unwrap_err().contains("no test program modes"));
     }
 
     #[test]

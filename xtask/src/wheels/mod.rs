@@ -218,7 +218,8 @@ fn reference_program(
     profile: &str,
 ) -> Result<PathBuf, String> {
     let mut cargo = cargo();
-    cargo.args(["build", "--profile", profile]);
+    // All members' features, as `build-tests` has them: with others, all would be built again.
+    cargo.args(["build", "--workspace", "--profile", profile]);
     run_it(cargo.args(reference.target).current_dir(root))?;
     // The profile `dev` builds in `debug`.
     let folder = build.join(if profile == "dev" { "debug" } else { profile });

@@ -49,7 +49,7 @@ pub(super) const PACKAGES: &[Package] = &[
         adapted: &["trimesh", "rtree", "scipy", "embreex", "pyvista", "matplotlib"],
         others: &[&[]],
         reference: Some(Reference {
-            target: &["-p", "rt-core", "--example", "bits"],
+            target: &["--example", "bits"],
             path: "examples/bits",
             variable: "RTSV_RT_CORE_BITS",
         }),
@@ -63,7 +63,7 @@ pub(super) const PACKAGES: &[Package] = &[
         adapted: &["pyvista", "xarray", "matplotlib", "mpi4py"],
         others: &[&[]],
         reference: Some(Reference {
-            target: &["-p", "schlieren", "--bin", "schlieren"],
+            target: &["--bin", "schlieren"],
             path: "schlieren",
             variable: "RTSV_SCHLIEREN_PROGRAM",
         }),
