@@ -42,6 +42,8 @@ use crate::view::View;
 use glam::DVec3;
 use std::sync::Arc;
 
+mod refine;
+
 pub use crate::derivative_bounds::DerivativeBounds;
 
 /// How light is traced through the field.
@@ -321,6 +323,20 @@ impl Plan {
         self.measure_with(field, view, rays, &FieldCache::default())
     }
 
+    /// The starts of the rays that are compared, and this plan's error.
+    fn sample(
+        &self,
+        field: &Field,
+        view: View,
+        rays: usize,
+        cache: &FieldCache,
+    ) -> (Vec<Start>, MeasuredError) {
+        let starts = sample_starts(field.size_m(), field.centre_m(), &view, rays.max(1));
+        let (max_rad, rms_rad, rays) = self.march_error(field, view, &starts, cache);
+        let resolution_rad = self.resolution_error(field, view, &starts, cache);
+        (starts, MeasuredError { max_rad, rms_rad, resolution_rad, rays })
+    }
+
     /// [`Plan::measure`] that reuses what `cache` holds for this field.
     pub fn measure_with(
         &self,
@@ -329,9 +345,18 @@ impl Plan {
         rays: usize,
         cache: &FieldCache,
     ) -> MeasuredError {
-        let starts = sample_starts(field.size_m(), field.centre_m(), &view, rays.max(1));
+        self.sample(field, view, rays, cache).1
+    }
+    /// Largest and root mean square error of the march alone, and the number of rays compared.
+    fn march_error(
+        &self,
+        field: &Field,
+        view: View,
+        starts: &[Start],
+        cache: &FieldCache,
+    ) -> (f64, f64, usize) {
         let mut planned = vec![Exit::UNDISTURBED; starts.len()];
-        self.paths_with(field, view, cache).trace_parallel(&starts, &mut planned);
+        self.paths_with(field, view, cache).trace_parallel(starts, &mut planned);
         let mut refined = planned.clone();
         let fine = Plan {
             mode: if self.mode == Mode::Full { Mode::Full } else { Mode::Paraxial },
@@ -340,10 +365,8 @@ impl Plan {
             request: Request { skip_rad: 0.0, ..self.request },
             ..*self
         };
-        fine.paths_with(field, view, cache).trace_parallel(&starts, &mut refined);
-        let (max_rad, rms_rad, rays) = compare(&planned, &refined);
-        let resolution_rad = self.resolution_error(field, view, &starts, cache);
-        MeasuredError { max_rad, rms_rad, resolution_rad, rays }
+        fine.paths_with(field, view, cache).trace_parallel(starts, &mut refined);
+        compare(&planned, &refined)
     }
 
     /// See [`MeasuredError::resolution_rad`]. Both interpolants are traced with the same steps, in

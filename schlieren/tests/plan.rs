@@ -233,10 +233,9 @@ fn the_tolerance_asked_for_is_got_or_a_warning_names_why_not() {
                     // slopes of the tolerance.
                     let kept = angle <= tolerance && path <= tolerance * longest_m;
                     // f32 keeps deflections within 1e-6 of the largest, which is 1e-3 rad in these
-                    // flows.
+                    // flows: the plan has to find out that f64 is needed.
                     let can = of_lattice[0] <= 0.5 * tolerance
-                        && of_lattice[1] <= 0.5 * tolerance * longest_m
-                        && tolerance > 1e-9;
+                        && of_lattice[1] <= 0.5 * tolerance * longest_m;
                     assert!(kept || !can, "the lattice can: {what}");
                     let named = |w: &String| {
                         w.contains("lattice") && w.contains(&format!("{tolerance:.1e}"))
@@ -256,6 +255,45 @@ fn the_tolerance_asked_for_is_got_or_a_warning_names_why_not() {
         "{straight} {bent} {got} {warned}"
     );
     assert!(for_nothing == 0, "{for_nothing} of {warned} warnings for nothing");
+}
+
+#[test]
+fn a_plan_that_misses_its_tolerance_is_refined_until_it_keeps_it() {
+    use schlieren::march::FieldCache;
+    let mut refined_plans = 0;
+    for (name, eps) in FLOWS {
+        let (field, cache) = (cube(NODES, eps), FieldCache::default());
+        for tolerance in [1e-6, 1e-8, 5e-10] {
+            let asked = Request { direction: Some(oblique().forward), ..request(tolerance) };
+            let plan = Plan::new(&field, asked);
+            let before = plan.measure(&field, oblique(), 200);
+            let (chosen, after) = plan.within_tolerance(&field, oblique(), 200, &cache);
+            let what = format!("{name}, {tolerance:e}: {before:?}, {chosen:?} {after:?}");
+            assert!(after.max_rad <= before.max_rad && chosen.request == asked, "{what}");
+            let goal = tolerance.max(0.1 * before.resolution_rad);
+            assert!(after.max_rad <= goal, "not refined: {what}");
+            refined_plans += usize::from(chosen != plan);
+            // What it says is what it does.
+            assert_eq!(chosen.measure(&field, oblique(), 200), after, "{what}");
+        }
+    }
+    assert!(refined_plans >= 1, "no plan missed its tolerance");
+}
+
+#[test]
+fn what_is_forced_is_not_refined() {
+    use schlieren::march::FieldCache;
+    let field = blob(48, 1e-4, 0.12);
+    let forced = Request {
+        mode: Some(Mode::Paraxial),
+        interpolant: Some(Interpolant::Trilinear),
+        step_voxels: Some(8.0),
+        ..request(1e-9)
+    };
+    let plan = Plan::new(&field, forced);
+    let cache = FieldCache::default();
+    let (chosen, error) = plan.within_tolerance(&field, oblique(), 100, &cache);
+    assert!(chosen == plan && error.max_rad > 1e-9, "{chosen:?} {error:?}");
 }
 
 /// A plan that used only differences along the lattice's axes, which are zero for a saddle, would

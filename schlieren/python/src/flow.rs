@@ -141,7 +141,7 @@ impl Flow {
     ) -> PyResult<Output> {
         let scene = scene_of(scene)?;
         let (map, phase, counts, noise) = layers;
-        let layers = Layers { map, phase, counts, noise };
+        let layers = Layers { map, phase, counts, noise, accuracy: true };
         let work = |stop: &rt_core_python_work::Stop| -> PyResult<Output> {
             let start = Instant::now();
             let (of, section) = self.section(&scene)?;

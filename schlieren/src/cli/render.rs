@@ -144,6 +144,7 @@ pub(super) fn render_and_write(
         phase: outputs.exr.is_some(),
         counts: outputs.exr.is_some(),
         noise: outputs.exr.is_some(),
+        accuracy: true,
     };
     let bar = common.progress(1000, scene.technique.name());
     let rendered = {

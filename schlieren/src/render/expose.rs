@@ -1,6 +1,7 @@
 //! Exposes a film to the light of every spectral line through the test section, and filters the
 //! noise.
 
+use super::paths::Accuracy;
 use super::{
     Control, Layers, PlannedPaths, RenderError, RenderOutput, Report, TestSection, technique,
 };
@@ -65,13 +66,12 @@ pub(super) fn expose_lines<'a>(
     for line in 0..lines.len() {
         let n0 = section.n0(line);
         let t = technique(scene, line, &framing, n0, tilted_beams)?;
-        let planned = section.paths(
-            scene,
-            line,
-            PathQuantities { opd: t.needs_opd() },
-            against_light,
-            layers.map && line == 0,
-        )?;
+        let accuracy = match first.as_ref().and_then(|f: &PlannedPaths<'_>| f.choice) {
+            Some(choice) => Accuracy::Known(choice),
+            None => Accuracy::measured(line == 0 && (layers.map || layers.accuracy)),
+        };
+        let quantities = PathQuantities { opd: t.needs_opd() };
+        let planned = section.paths_of(scene, line, quantities, against_light, accuracy)?;
         if line == 0 {
             r.report.add_plan(&planned);
         }

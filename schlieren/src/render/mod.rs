@@ -50,6 +50,7 @@ use crate::scene::{Counters, Effects, Scene, SceneError, TechniqueSpec};
 use crate::spectrum::filter_band;
 use crate::technique::volume::ComparisonError;
 use crate::technique::{Technique, bos, interferogram, schlieren, slice, volume};
+use paths::Accuracy;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Errors of rendering.
@@ -136,7 +137,7 @@ impl Default for Control<'_> {
     }
 }
 
-/// Layers to compute besides the image. Others are not computed.
+/// What to compute besides the image. Nothing else is computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[allow(clippy::struct_excessive_bools, reason = "independent wishes")]
 pub struct Layers {
@@ -148,13 +149,19 @@ pub struct Layers {
     pub counts: bool,
     /// The image's noise.
     pub noise: bool,
+    /// The error of deflections. The plan is refined until that is within the tolerance
+    /// ([`crate::plan::Plan::within_tolerance`]), and a warning says if it cannot be. With
+    /// [`Layers::map`] this is done in any case.
+    pub accuracy: bool,
 }
 
 impl Layers {
     /// The image alone.
-    pub const NONE: Layers = Layers { map: false, phase: false, counts: false, noise: false };
+    pub const NONE: Layers =
+        Layers { map: false, phase: false, counts: false, noise: false, accuracy: false };
     /// All layers.
-    pub const ALL: Layers = Layers { map: true, phase: true, counts: true, noise: true };
+    pub const ALL: Layers =
+        Layers { map: true, phase: true, counts: true, noise: true, accuracy: true };
 }
 
 /// An image with its layers and report. Images and layers are stored row by row from the top.
@@ -287,6 +294,7 @@ pub fn render(
         _ => first = expose::expose_lines(scene, section, layers, control, &mut r)?,
     }
     let measured = first.is_some();
+    let chosen = first.as_ref().and_then(|planned| planned.choice);
     if control.cancel.load(Ordering::Relaxed) {
         return Err(RenderError::Cancelled);
     }
@@ -305,13 +313,14 @@ pub fn render(
         // not computed for photons that do not need it.
         let planned = match first.filter(|p| p.paths.quantities().opd || !layers.phase) {
             Some(planned) => planned,
-            None => section.paths(
-                scene,
-                0,
-                PathQuantities { opd: layers.phase },
-                against_light,
-                !measured,
-            )?,
+            None => {
+                let accuracy = match chosen {
+                    Some(choice) => Accuracy::Known(choice),
+                    None => Accuracy::measured(!measured),
+                };
+                let quantities = PathQuantities { opd: layers.phase };
+                section.paths_of(scene, 0, quantities, against_light, accuracy)?
+            }
         };
         add_map(scene, section, &planned, &mut r);
         media::add_map(scene, section, &planned, &mut r)?;

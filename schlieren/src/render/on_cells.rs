@@ -1,12 +1,12 @@
 //! Plans light paths through the cells of a mesh: as few steps in each cell as the tolerance
 //! allows.
 
-use super::planned::PlannedPaths;
+use super::planned::{Choice, PlannedPaths};
 use crate::gas_on_cells::GasOnCells;
 use crate::march::OnCells;
 use crate::media::Bend;
 use crate::path::{Exit, LightPaths, PathQuantities};
-use crate::plan::{compare, sample_starts};
+use crate::plan::{Request, compare, sample_starts};
 use crate::view::View;
 use std::collections::BTreeMap;
 
@@ -15,18 +15,30 @@ const STEPS: [u32; 3] = [1, 2, 4];
 /// Steps of the rays that measure the error, by those of the plan.
 const FINER: u32 = 4;
 
-/// Paths whose error, measured with `measured_rays` rays in finer steps, is within the tolerance,
-/// if four steps in each cell reach it. Without measuring, there is one step.
+/// How the steps in each cell are chosen.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Steps {
+    /// One, without measuring.
+    One,
+    /// As few as keep the tolerance, by the error of so many rays against finer steps.
+    Measured { rays: usize },
+    /// What was chosen before.
+    Known(u32),
+}
+
+/// Paths whose error is within the tolerance, if four steps in each cell reach it.
 pub(super) fn planned(
     gas: &GasOnCells,
     view: View,
     quantities: PathQuantities,
     tolerance_rad: f64,
-    measured_rays: Option<usize>,
+    chosen: Steps,
 ) -> PlannedPaths<'_> {
-    let mut paths = OnCells::new(gas, view, quantities, STEPS[0]);
     let (mut steps, mut error_rad) = (STEPS[0], None);
-    if let Some(rays) = measured_rays {
+    if let Steps::Known(known) = chosen {
+        steps = known;
+    }
+    if let Steps::Measured { rays } = chosen {
         let starts = sample_starts(gas.size_m(), gas.centre_m(), &view, rays);
         let trace = |steps: u32| {
             let mut exits = vec![Exit::UNDISTURBED; starts.len()];
@@ -45,12 +57,14 @@ pub(super) fn planned(
                 break;
             }
         }
-        paths = OnCells::new(gas, view, quantities, steps);
     }
+    let paths = OnCells::new(gas, view, quantities, steps);
     let per_cell = if steps == 1 { "one step".into() } else { format!("{steps} steps") };
     let (work, description) = (paths.work(), format!("verlet on cells, {per_cell} in each"));
+    let request = Request { tolerance_rad, ..Request::default() };
     let mut planned =
-        PlannedPaths::new(Box::new(paths), description, None, tolerance_rad, (Bend::Full, 1.0));
+        PlannedPaths::new(Box::new(paths), description, None, &request, (Bend::Full, 1.0));
+    planned.choice = Some(Choice::Cells { steps });
     if let Some(error) = error_rad.filter(|e| *e > tolerance_rad) {
         planned.warnings.push(format!(
             "deflections are off by up to {error:.1e} rad, above the tolerance of \

@@ -3,7 +3,7 @@
 use super::RenderError;
 use super::planned::PlannedPaths;
 #[cfg(feature = "gpu")]
-use super::planned::described;
+use super::planned::{Choice, described};
 use crate::field::Field;
 use crate::march::FieldCache;
 use crate::plan::Request;
@@ -105,6 +105,16 @@ pub(super) fn on_gpu<'a>(
                 gpu.name()
             )));
         }
+        // The error is measured with the CPU's march, which agrees within rounding. Only steps and
+        // interpolant can be refined: the GPU has one march.
+        let here = Plan { request: Request { mode: Some(plan.mode), ..plan.request }, ..plan };
+        let (plan, achieved) = match measured_rays {
+            None => (plan, None),
+            Some(rays) => {
+                let (refined, error) = here.within_tolerance(field, view, rays, cache);
+                (Plan { request, ..refined }, Some(error))
+            }
+        };
         let options = GpuOptions {
             step_voxels: plan.step_voxels,
             quantities: request.quantities,
@@ -125,20 +135,29 @@ pub(super) fn on_gpu<'a>(
                 made => break made?,
             }
         };
-        Ok((paths, gpu, warning))
+        Ok((paths, gpu, warning, plan, achieved))
     })();
     match made {
-        Ok((paths, gpu, warning)) => {
-            // The error is measured with the CPU's march, which agrees within rounding.
-            let achieved = measured_rays.map(|rays| plan.measure_with(field, view, rays, cache));
+        Ok((paths, gpu, warning, plan, achieved)) => {
             let description = described("verlet", plan.interpolant, plan.step_voxels);
             let mut planned = PlannedPaths::new(
                 Box::new(paths),
                 format!("{description}, on {}", gpu.name()),
                 achieved,
-                march.tolerance_rad,
+                &request,
                 (Mode::Paraxial.into(), plan.step_voxels),
             );
+            planned.choice = Some(Choice::Lattice(plan));
+            if request.mode.is_none()
+                && achieved.is_some_and(|a| {
+                    a.max_rad > request.tolerance_rad && a.resolution_rad <= request.tolerance_rad
+                })
+            {
+                planned.warnings.push(
+                    "the GPU's march is in single precision; the CPU has a finer one (--device cpu)"
+                        .into(),
+                );
+            }
             planned.warnings.extend(warning);
             Ok(Ok(planned))
         }

@@ -2,9 +2,9 @@
 //! tolerance what the scene leaves open, and measures the error. Marches for comparison, which no
 //! plan chooses, are made here.
 
-use super::on_cells;
+use super::on_cells::{self, Steps};
 use super::on_gpu::on_gpu;
-use super::planned::{PlannedPaths, described};
+use super::planned::{Choice, PlannedPaths, described};
 use super::{RenderError, TestSection};
 use crate::field::Field;
 use crate::interpolate::{BSpline, Interpolant, Interpolate, Trilinear, TrilinearGradient};
@@ -31,10 +31,28 @@ const MEASURED_RAYS: usize = 256;
 /// up to a thousandth of a wave.
 const SKIPPED_WAVES: f64 = 1e-5;
 
+/// What is known of the accuracy of paths before they are traced.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Accuracy {
+    /// The bounds of the plan.
+    Bounded,
+    /// Its error, measured with some rays. It is refined until that is within the tolerance.
+    Measured,
+    /// That of a plan for another wavelength or other quantities, which this one repeats.
+    Known(Choice),
+}
+
+impl Accuracy {
+    pub(super) fn measured(measure: bool) -> Accuracy {
+        if measure { Accuracy::Measured } else { Accuracy::Bounded }
+    }
+}
+
 impl TestSection {
     /// Light paths through field `line` with the scene's march. With `against_light` they are
     /// traced from the camera. With `measure` some rays are traced with everything refined, to
-    /// measure the error.
+    /// measure the error, and the plan is refined until that is within the tolerance
+    /// ([`Plan::within_tolerance`]).
     ///
     /// # Errors
     /// If the scene names a march or an interpolant that does not exist, requests a GPU that is not
@@ -47,11 +65,28 @@ impl TestSection {
         against_light: bool,
         measure: bool,
     ) -> Result<PlannedPaths<'_>, RenderError> {
+        self.paths_of(scene, line, quantities, against_light, Accuracy::measured(measure))
+    }
+
+    /// [`TestSection::paths`], also those of a plan that was measured before.
+    pub(super) fn paths_of(
+        &self,
+        scene: &Scene,
+        line: usize,
+        quantities: PathQuantities,
+        against_light: bool,
+        accuracy: Accuracy,
+    ) -> Result<PlannedPaths<'_>, RenderError> {
+        let measure = matches!(accuracy, Accuracy::Measured);
         let march = &scene.march;
         let view = if against_light { ReversedPaths::view(&self.view) } else { self.view };
         if let Some(gas) = self.cells.get(line) {
-            let rays = measure.then_some(MEASURED_RAYS);
-            let mut planned = on_cells::planned(gas, view, quantities, march.tolerance_rad, rays);
+            let steps = match accuracy {
+                Accuracy::Known(Choice::Cells { steps }) => Steps::Known(steps),
+                _ if measure => Steps::Measured { rays: MEASURED_RAYS },
+                _ => Steps::One,
+            };
+            let mut planned = on_cells::planned(gas, view, quantities, march.tolerance_rad, steps);
             if march.device == Device::Auto {
                 planned.warnings.push(
                     "computed on the CPU: the GPU traces light on lattices, not on cells".into(),
@@ -88,6 +123,17 @@ impl TestSection {
             skip_opd_m: SKIPPED_WAVES * scene.light.wavelengths_nm[line] * 1e-9,
         };
 
+        // What is repeated is as good as forced. The mode is not: the GPU has one only.
+        let known = match accuracy {
+            Accuracy::Known(Choice::Lattice(plan)) => Some(plan),
+            _ => None,
+        };
+        let with = |mode| Request {
+            interpolant: known.map_or(interpolant, |p| Some(p.interpolant)),
+            step_voxels: known.map_or(march.step_voxels, |p| Some(p.step_voxels)),
+            ..with(mode)
+        };
+
         // Uses the GPU if wanted and possible.
         let mode = method.map(|name| match name {
             "line-of-sight" => Mode::LineOfSight,
@@ -110,7 +156,7 @@ impl TestSection {
             Err(why_not) => why_not,
         };
 
-        let mut skip_warning = None;
+        let (mut skip_warning, mut choice) = (None, None);
         // Marches for comparison are selected by name only.
         let (paths, description, achieved, media_step) =
             if let Some(name @ ("euler" | "sharma" | "rk4")) = method {
@@ -121,12 +167,20 @@ impl TestSection {
                 let bend = if name == "euler" { Bend::Paraxial } else { Bend::Full };
                 (paths, described(name, interpolant, step_voxels), None, (bend, step_voxels))
             } else {
-                let plan =
+                let mode = known.map_or(mode, |p| Some(p.mode));
+                let mut plan =
                     Plan::from_derivative_bounds(field, with(mode), cache.derivative_bounds(field));
-                let media_step = (Bend::from(plan.mode), plan.step_voxels);
                 // A plan makes PEFRL with the spline only.
-                if plan.mode == Mode::Full && interpolant.is_some_and(|i| i != Interpolant::BSpline)
-                {
+                let by_name = plan.mode == Mode::Full
+                    && interpolant.is_some_and(|i| i != Interpolant::BSpline);
+                let mut achieved = None;
+                if measure && !by_name {
+                    let (refined, error) = plan.within_tolerance(field, view, MEASURED_RAYS, cache);
+                    (plan, achieved) = (refined, Some(error));
+                }
+                choice = Some(Choice::Lattice(plan));
+                let media_step = (Bend::from(plan.mode), plan.step_voxels);
+                if by_name {
                     let step = plan.step_voxels;
                     let options =
                         FullOptions { step_voxels: step, quantities, ..FullOptions::default() };
@@ -139,8 +193,6 @@ impl TestSection {
                         Mode::Paraxial => "verlet",
                         Mode::Full => "pefrl",
                     };
-                    let achieved =
-                        measure.then(|| plan.measure_with(field, view, MEASURED_RAYS, cache));
                     let mut description = described(name, plan.interpolant, plan.step_voxels);
                     if march.skip_rad > 0.0 {
                         match plan.mode {
@@ -156,8 +208,8 @@ impl TestSection {
                     (plan.paths_with(field, view, cache), description, achieved, media_step)
                 }
             };
-        let mut planned =
-            PlannedPaths::new(paths, description, achieved, march.tolerance_rad, media_step);
+        let mut planned = PlannedPaths::new(paths, description, achieved, &with(mode), media_step);
+        planned.choice = choice;
         planned.warnings.extend(why_not);
         planned.warnings.extend(skip_warning);
         Ok(self.attenuated(scene, line, view, planned)?.in_image_frame(against_light))

@@ -3,10 +3,19 @@ use crate::interpolate::Interpolant;
 use crate::march::CellWork;
 use crate::media::Bend;
 use crate::path::LightPaths;
-use crate::plan::MeasuredError;
+use crate::plan::{MeasuredError, Plan, Request};
 use crate::technique::bos::ReversedPaths;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+
+/// A plan's choices, for repeating them.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Choice {
+    /// The march through a lattice.
+    Lattice(Plan),
+    /// The march through cells.
+    Cells { steps: u32 },
+}
 
 /// Light paths through one of the fields, with their measured accuracy.
 pub struct PlannedPaths<'a> {
@@ -26,6 +35,8 @@ pub struct PlannedPaths<'a> {
     pub(super) step_voxels: f64,
     /// Number of rays along which media were integrated.
     pub(super) media_rays: Arc<AtomicU64>,
+    /// What another wavelength may repeat; `None` for marches for comparison.
+    pub(super) choice: Option<Choice>,
     /// The work on the cells of a mesh; `None` on a lattice.
     pub(super) cell_work: Option<Arc<CellWork>>,
 }
@@ -35,10 +46,10 @@ impl<'a> PlannedPaths<'a> {
         paths: Box<dyn LightPaths + 'a>,
         description: String,
         achieved: Option<MeasuredError>,
-        tolerance_rad: f64,
+        request: &Request,
         (bend, step_voxels): (Bend, f64),
     ) -> PlannedPaths<'a> {
-        let warnings = achieved.map_or(Vec::new(), |a| accuracy_warnings(&a, tolerance_rad));
+        let warnings = achieved.map_or(Vec::new(), |a| accuracy_warnings(&a, request));
         PlannedPaths {
             paths,
             description,
@@ -48,6 +59,7 @@ impl<'a> PlannedPaths<'a> {
             bend,
             step_voxels,
             media_rays: Arc::default(),
+            choice: None,
             cell_work: None,
         }
     }
@@ -70,18 +82,26 @@ impl<'a> PlannedPaths<'a> {
 }
 
 /// What keeps the deflections from the tolerance, with cures.
-fn accuracy_warnings(achieved: &MeasuredError, tolerance_rad: f64) -> Vec<String> {
+fn accuracy_warnings(achieved: &MeasuredError, request: &Request) -> Vec<String> {
+    let tolerance_rad = request.tolerance_rad;
     let MeasuredError { max_rad, resolution_rad, .. } = *achieved;
     let mut warnings = Vec::new();
     if max_rad > tolerance_rad {
         let [error, tolerance] = told_apart(max_rad, tolerance_rad);
+        let set = Plan::set_by_request(request).join(", ");
         let cause = if resolution_rad > tolerance_rad {
             "the flow has structures that its lattice does not resolve: smooth shocks \
-             (flow.smoothing_nodes) or use a finer lattice"
+             (flow.smoothing_nodes, --smoothing) or use a finer lattice"
+                .to_owned()
+        } else if set.is_empty() {
+            "the plan has no finer march: use a larger tolerance (march.tolerance_rad, \
+             --tolerance)"
+                .to_owned()
         } else {
-            "the lattice resolves the flow, so the march is too coarse or at the end of its digits: \
-             leave its method, interpolant and step to the plan, or use a larger tolerance \
-             (march.tolerance_rad)"
+            format!(
+                "the lattice resolves the flow, and what is set limits the march: leave {set} to \
+                 the plan, or use a larger tolerance (march.tolerance_rad, --tolerance)"
+            )
         };
         warnings.push(format!(
             "deflections are off by up to {error} rad, above the tolerance of {tolerance} rad; \
@@ -93,7 +113,8 @@ fn accuracy_warnings(achieved: &MeasuredError, tolerance_rad: f64) -> Vec<String
         warnings.push(format!(
             "the flow's own lattice limits deflections to about {error} rad, above the tolerance \
              of {tolerance} rad, with any march: use a finer lattice, smoother shocks \
-             (flow.smoothing_nodes) or a larger tolerance (march.tolerance_rad)"
+             (flow.smoothing_nodes, --smoothing) or a larger tolerance (march.tolerance_rad, \
+             --tolerance)"
         ));
     }
     warnings
@@ -123,8 +144,21 @@ pub(super) fn described(name: &str, interpolant: Interpolant, step_voxels: f64) 
 mod tests {
     use super::*;
 
+    fn warnings_of(max_rad: f64, resolution_rad: f64, set: Request) -> Vec<String> {
+        let error = MeasuredError { max_rad, rms_rad: 0.0, resolution_rad, rays: 400 };
+        accuracy_warnings(&error, &Request { tolerance_rad: 1e-7, ..set })
+    }
+
     fn warnings(max_rad: f64, resolution_rad: f64) -> Vec<String> {
-        accuracy_warnings(&MeasuredError { max_rad, rms_rad: 0.0, resolution_rad, rays: 400 }, 1e-7)
+        warnings_of(max_rad, resolution_rad, Request::default())
+    }
+
+    #[test]
+    fn what_is_set_is_named_where_it_limits_the_march() {
+        let set = Request { step_voxels: Some(8.0), skip_rad: 1e-9, ..Request::default() };
+        let limited = warnings_of(2e-7, 8e-9, set);
+        assert!(limited[0].contains("leave march.step_voxels (--step), march.skip_rad (--skip"));
+        assert!(warnings(2e-7, 8e-9)[0].contains("no finer march"));
     }
 
     #[test]

@@ -324,7 +324,7 @@ impl Worker {
             cancel: if level.stoppable { &session.cancel } else { &NEVER },
             progress: &|_| {},
         };
-        let layers = Layers { noise: true, ..Layers::NONE };
+        let layers = Layers { noise: true, accuracy: !level.draft, ..Layers::NONE };
         self.with_section(level.coarse, |s| render::render(&level.scene, s, layers, &control))?
     }
 
@@ -339,9 +339,9 @@ impl Worker {
         {
             return Ok(t.clone());
         }
-        let scene = &level.scene;
+        let (scene, draft) = (&level.scene, level.draft);
         let traced = self.with_section(level.coarse, |section| {
-            let planned = section.paths(scene, 0, PathQuantities { opd: false }, false, false)?;
+            let planned = section.paths(scene, 0, PathQuantities { opd: false }, false, !draft)?;
             let framing = framing(scene, section);
             let blocked = |s: &crate::path::Start| {
                 section.solids.as_ref().is_some_and(|b| b.block(&section.view, s))
