@@ -311,7 +311,7 @@ fn describe(rows: &[Row]) -> String {
 /// A cube of 1 m around the origin of tetrahedra over `points`³ points. Inner points are moved by a
 /// wave of 0.02 m and at random by up to 0.1 of their distance along each axis, which turns no
 /// tetrahedron inside out.
-fn tetrahedra(points: usize) -> UnstructuredGrid {
+pub(super) fn tetrahedra(points: usize) -> UnstructuredGrid {
     let mut random = SplitMix64::new(3);
     let spacing = 1.0 / (points - 1) as f64;
     let mut places = vec![];

@@ -8,10 +8,12 @@ mod accuracy_resample;
 mod accuracy_robust;
 mod accuracy_sampling;
 mod accuracy_schlieren;
+mod accuracy_tolerance;
 mod accuracy_volume;
 mod baselines;
 mod baselines_schlieren;
 mod call_overhead;
+mod closed_form_gases;
 mod compare;
 mod effects;
 mod fig3_5;
@@ -265,6 +267,13 @@ pub const ALL: &[Experiment] = &[
         title: "Error against time of light’s way through a gas, and the tolerance asked against \
                 the error got",
         run: accuracy_schlieren::run,
+    },
+    Experiment {
+        id: "accuracy-tolerance",
+        chapter: 5,
+        title: "The tolerance asked for against the error got: thirty gases, lattices and meshes, \
+                two views",
+        run: accuracy_tolerance::run,
     },
     Experiment {
         id: "accuracy-gpu",
