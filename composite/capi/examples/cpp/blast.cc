@@ -5,6 +5,9 @@
 // mpirun -n 8 ./blast OUT [CELLS [STEPS [PIXELS]]]; rank 0 writes OUT-STEP.volume (RGBA) and
 // OUT-STEP.schlieren (grey), raw floats, PIXELS x PIXELS. The files have the same bytes for any
 // number of ranks. BLAST_STALL=RANK and BLAST_DIE=RANK show what becomes of the others.
+// Without the classes of C++ that MPI had before version 3.
+#define OMPI_SKIP_MPICXX
+#define MPICH_SKIP_MPICXX
 #include <mpi.h>
 #include <rtsv_composite.h>
 
