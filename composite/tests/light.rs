@@ -1,9 +1,19 @@
 //! Photographs of a gas in bricks: the bits of one process, and faults that have a name.
+#[path = "meddling/mod.rs"]
+mod meddling;
+#[path = "meddling/mutation.rs"]
+mod mutation;
+#[path = "meddling/words.rs"]
+mod words;
+
+use composite::CommError;
 use composite::render::FrameError;
 use composite::render::light::{
     Gas, GasBrick, LightOptions, LightOutput, LightTechnique, Shot, Strided, photograph,
 };
 use composite::{Communicator, threads};
+use meddling::{Meddling, Outgoing};
+use mutation::{Random, mutate};
 use rt_core::glam::{DVec3, UVec3};
 use schlieren::cutoff::{Cutoff, Knife, KnifePosition};
 use schlieren::field::Field;
@@ -18,6 +28,7 @@ use schlieren::technique::schlieren::Schlieren;
 use schlieren::view::View;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
+use words::change_words;
 
 const DIMS: UVec3 = UVec3::new(25, 21, 17);
 const K: f64 = 2.26e-4;
@@ -271,4 +282,69 @@ fn what_does_not_fit_together_is_named_on_every_rank() {
         }
     });
     assert!(text.contains("one more layer of nodes"), "{text}");
+}
+
+#[test]
+fn rays_with_random_changes_end_in_the_picture_or_in_named_errors() {
+    const RANKS: usize = 4;
+    let parts = UVec3::new(2, 2, 1);
+    let shot = Shot { width: 9, height: 7, ..shot(KNIFE, OBLIQUE) };
+    let expected = picture(by_ranks(UVec3::ONE, 0, &shot)).picture;
+    let (mut failed, mut unchanged) = (0, 0);
+    for seed in 0..600 {
+        let mut random = Random(seed);
+        let (culprit, is_consistent) = (random.below(RANKS), random.below(2) == 0);
+        let what = match random.below(2) {
+            0 => Outgoing::Gathered(random.below(8)),
+            _ => Outgoing::Message(random.below(4)),
+        };
+        let case = format!("seed {seed}: rank {culprit}, {what:?}");
+        let ends = threads::run(RANKS, |inner| {
+            let rank = inner.rank();
+            let mut comm = Meddling::new(inner, |outgoing, message| {
+                let mut random = Random(!seed);
+                if rank != culprit || outgoing != what {
+                } else if is_consistent {
+                    change_words(message, |words| {
+                        let mut bytes: Vec<u8> =
+                            words.iter().flat_map(|w| w.to_le_bytes()).collect();
+                        mutate(&mut random, &mut bytes);
+                        let whole = bytes.as_chunks::<4>().0;
+                        *words = whole.iter().map(|c| u32::from_le_bytes(*c)).collect();
+                    });
+                } else {
+                    mutate(&mut random, message);
+                }
+                true
+            });
+            let (first, dims, values) = nodes(parts, rank as u32, 1);
+            let strides = [1, dims.x as usize, (dims.x * dims.y) as usize];
+            let values = Strided::new(&values, dims, strides).expect("all nodes");
+            let brick = GasBrick { first, dims, values: &values };
+            let options = LightOptions { timeout: Duration::from_secs(5), ..options() };
+            let end = photograph(&mut comm, &gas(), Some(&brick), &shot, &options);
+            (end, comm.requested_bytes)
+        });
+        let mut errors = 0;
+        for end in ends {
+            let (end, bytes) = end.unwrap_or_else(|panic| panic!("{case}: {panic}"));
+            assert!(bytes < 1 << 20, "{case}: {bytes} bytes were asked for");
+            match end {
+                Ok(output) => {
+                    let same = output.picture.is_none() || output.picture == expected;
+                    assert!(same || is_consistent, "{case}: another picture");
+                }
+                Err(error) => {
+                    errors += 1;
+                    assert!(error.to_string().contains("rank"), "{case}: {error}");
+                    let timeout = matches!(error, FrameError::Comm(CommError::Timeout { .. }));
+                    assert!(!timeout, "{case}: {error}");
+                }
+            }
+        }
+        assert!(errors == 0 || errors == RANKS, "{case}: {errors} of {RANKS} have an error");
+        failed += usize::from(errors > 0);
+        unchanged += usize::from(errors == 0);
+    }
+    assert!(failed > 100 && unchanged > 50, "{failed} failed, {unchanged} did not");
 }

@@ -80,7 +80,8 @@ pub unsafe extern "C" fn rtsv_composite_shot_init(
 
 fn shot_of(s: &RtsvCompositeShot) -> Result<Shot, Failure> {
     let other = |member: &str, value: u32, name: &str| {
-        let text = format!("{member} of RtsvCompositeShot is {value}: give {name} or one beside it");
+        let text =
+            format!("{member} of RtsvCompositeShot is {value}: give {name} or one beside it");
         Failure::value(text)
     };
     Ok(Shot {
@@ -194,8 +195,8 @@ pub unsafe extern "C" fn rtsv_composite_photograph(
 fn densities_of(brick: &RtsvCompositeBrick) -> Result<Option<Densities>, Failure> {
     unused(brick.reserved, "RtsvCompositeBrick")?;
     unused(brick.volume, "RtsvCompositeBrick, as its volume,")?;
-    let strides = strides_of(brick, FLOATS)
-        .map_err(|f| Failure::value(format!("gas: brick: {}", f.text)))?;
+    let strides =
+        strides_of(brick, FLOATS).map_err(|f| Failure::value(format!("gas: brick: {}", f.text)))?;
     Ok(strides.map(|strides| Densities {
         data: brick.values.data,
         strides,

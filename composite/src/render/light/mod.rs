@@ -192,16 +192,28 @@ fn in_channel<V: GasValues>(
 
     let optical = brick.map(|brick| Optical::new(gas, brick, own));
     let (exits, mut report) = rays::trace(channel, &setup, &bricks, optical.as_ref(), options)?;
-    let Some(exits) = exits else { return Ok((None, report)) };
+    let film = exits.map(|exits| developed(channel, &setup, exits, &mut report)).transpose()?;
+    // A root that got what cannot be ends the photograph for all.
+    channel.all_gather(&[0])?;
+    Ok((film, report))
+}
+
+/// The picture of the exits.
+fn developed(
+    channel: &RankChannel<'_>,
+    setup: &Setup,
+    exits: Vec<Exit>,
+    report: &mut LightReport,
+) -> Result<Film, FrameError> {
     let (view, technique) = (*setup.march.view(), &setup.technique);
     let film = expose_corners::<1>(setup.framing, view, technique, exits.clone());
-    let (film, _) =
-        film.ok_or_else(|| channel.message_error(channel.rank(), "exits of light", exits.len()))?;
+    let fault = || channel.message_error(channel.rank(), "exits of light", exits.len());
+    let (film, _) = film.ok_or_else(fault)?;
     let count = |status| exits.iter().filter(|exit| exit.status == status).count() as u64;
     report.masked = count(Status::Masked);
     report.turned = count(Status::Turned);
     let picture = film.to_pixels(1.0).into_iter().map(|[grey]| grey).collect();
-    Ok((Some((picture, exits)), report))
+    Ok((picture, exits))
 }
 
 fn brick_of(words: &[u32]) -> Brick {
