@@ -71,7 +71,7 @@ pub(super) fn trace<V: GasValues>(
         for step in 1..size {
             let to = (rank + step) % size;
             if !outgoing[to].is_empty() {
-                channel.send(to, Tag::Request, &outgoing[to])?;
+                channel.send_request(to, &outgoing[to])?;
             }
         }
         let mut sources = Vec::new();
@@ -85,14 +85,9 @@ pub(super) fn trace<V: GasValues>(
                 sources.push((from, words));
             }
         }
-        channel.receive(Tag::Request, "rays of light", sources, |channel, from, words| {
-            let announced = lengths[from][rank] as usize;
+        channel.receive_requests("rays of light", sources, |channel, from, words| {
             let fault = || channel.message_error(from, "rays of light", words.len());
-            let (chunks, rest) = words.as_chunks();
-            if words.len() != announced || !rest.is_empty() {
-                return Err(fault());
-            }
-            for chunk in chunks {
+            for chunk in words.as_chunks().0 {
                 let (number, state) = read_ray(chunk);
                 let is_ray = (number as usize) < count
                     && own.is_some()
