@@ -260,8 +260,7 @@ impl InBricks {
                 _ => {
                     // tau is not depth: a ray that has gained depth goes back to its exit plane.
                     let forward = rate + state.u.dot(direction);
-                    // Not `<= 0`: NaN is no direction either.
-                    if !(forward > 0.0) {
+                    if forward.is_nan() || forward <= 0.0 {
                         return Progress::Left(self.exit(&ray, state, Status::Turned));
                     }
                     let dtau_m = -state.xi_m.dot(direction) / forward;

@@ -3,7 +3,7 @@
 use super::compositing::timeout_of;
 use super::group::collective;
 use super::light_types::*;
-use super::memory::{at, check_pointer, check_size, flag, put, read, unused};
+use super::memory::{Owners, at, check_pointer, check_size, flag, put, read, unused};
 use super::scene_types::*;
 use super::status::{Failure, guarded};
 use super::tuples::FLOATS;
@@ -128,12 +128,12 @@ pub unsafe extern "C" fn rtsv_composite_photograph(
     photograph: *mut RtsvCompositePhotograph,
 ) -> RtsvCompositeStatus {
     guarded(|| {
-        // SAFETY: the caller's promise, also below.
         let brick = match brick.is_null() {
             true => None,
+            // SAFETY: the caller's promise, also below.
             false => Some(unsafe { read(brick, "brick") }?),
         };
-        let _owners = super::memory::Owners::of(&brick.map_or(Vec::new(), |b| vec![b.values]));
+        let _owners = Owners::of(&brick.map_or(Vec::new(), |b| vec![b.values]));
         collective(comm.addr(), |comm| {
             // SAFETY: as above.
             let (gas, given, out) = unsafe {
