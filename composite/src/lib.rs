@@ -31,6 +31,7 @@
 //! |---|---|---|
 //! | none | strategies, streaming, merging in shared memory, deep frames; ranks as threads, over MPI, or simulated | five small crates; no MPI, no C |
 //! | `render` | module `render`: frames of a scene that ranks hold parts of | rt-core, datasets |
+//! | `light` | module `render::light`: photographs of a gas that ranks hold in bricks | `render`, schlieren |
 //! | `icet` | module `icet`: IceT over the same ranks | nothing |
 //! | `cli` (the default) | module `cli`, the program `composite` | `render`, `icet`, clap |
 //!

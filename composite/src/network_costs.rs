@@ -1,6 +1,7 @@
 //! Costs of messages and strategies: the LogGP model of A. Alexandrov, M. Ionescu, K. Schauser, C.
 //! Scheiman (SPAA 1995), measured once over the communicator itself, and the time of each strategy
 //! that follows from it.
+use crate::comm::sim::Network;
 use crate::comm::{CommError, Communicator};
 use crate::pixel::Composite;
 use crate::rank_order::Folding;
@@ -36,8 +37,17 @@ const LOCAL_MESSAGE_SECS: f64 = 5e-6;
 
 impl NetworkCosts {
     /// InfiniBand QDR as in the thesis' cluster: 3.2 GB/s, about a microsecond.
-    pub const QDR: Self =
-        Self { latency_secs: 1.5e-6, overhead_secs: 0.5e-6, byte_secs: 1.0 / 3.2e9 };
+    pub const QDR: Self = Self::of(&Network::QDR);
+
+    /// What [`NetworkCosts::measure`] would find on a network whose parameters are known, without
+    /// corrections for the lengths of messages.
+    pub const fn of(network: &Network) -> Self {
+        Self {
+            latency_secs: network.latency_secs + 2.0 * network.overhead_secs,
+            overhead_secs: network.overhead_secs + network.gap_secs,
+            byte_secs: network.byte_secs,
+        }
+    }
 
     /// Measures with messages between the first and the last rank. All ranks must call it, and all
     /// get the values of rank 0.
@@ -264,6 +274,20 @@ mod tests {
                         && found[0].byte_secs > 0.0
                 );
             }
+        }
+    }
+
+    #[test]
+    fn costs_measured_on_a_simulated_network_are_those_of_its_parameters() {
+        use crate::comm::sim::{Compute, run};
+        for network in [Network::QDR, Network::HDR, Network::GIGABIT] {
+            let found = run(2, network, Compute::Given, |mut comm| {
+                NetworkCosts::measure(&mut comm, Duration::from_secs(20)).expect("a measurement")
+            });
+            let (found, known) = (found[0].as_ref().expect("a rank"), NetworkCosts::of(&network));
+            let near = |a: f64, b: f64| (a / b - 1.0).abs() < 0.1;
+            assert!(near(found.latency_secs, known.latency_secs), "{found:?} {known:?}");
+            assert!(near(found.byte_secs, known.byte_secs), "{found:?} {known:?}");
         }
     }
 

@@ -1,10 +1,11 @@
 //! Ranks that announce false numbers are rejected by name before memory is allocated for them.
-use composite::comm::{Arrival, Receive};
+mod meddling;
+
 use composite::{
-    CommError, Communicator, CompositeError, Compositor, DeepFrame, DepthPixel, Destination,
-    Fragment, Frame, MessageError, Options, PremultipliedPixel, Rect, Strategy, composite_deep,
-    threads,
+    Communicator, CompositeError, Compositor, DeepFrame, DepthPixel, Destination, Fragment, Frame,
+    MessageError, Options, PremultipliedPixel, Rect, Strategy, composite_deep, threads,
 };
+use meddling::{Meddling, Outgoing};
 use proptest::prelude::*;
 use std::time::Duration;
 
@@ -15,82 +16,20 @@ const LIAR: usize = 1;
 const STRATEGIES: [Strategy; 4] =
     [Strategy::DirectSend, Strategy::Tree, Strategy::BinarySwap, Strategy::RadixK { k: 4 }];
 
-/// A communicator whose rank [`LIAR`] falsifies its contributions to all-gathers, and that counts
-/// the requested memory.
-struct Lying<F> {
+/// A communicator whose rank [`LIAR`] falsifies its contributions to all-gathers by their number.
+fn lying(
     inner: threads::ThreadComm,
-    lie: F,
-    /// All-gathers so far.
-    gathered: usize,
-    /// Bytes of requested receives and buffers.
-    requested_bytes: usize,
-}
-
-impl<F: Fn(usize, &mut Vec<u8>)> Communicator for Lying<F> {
-    fn rank(&self) -> usize {
-        self.inner.rank()
-    }
-
-    fn size(&self) -> usize {
-        self.inner.size()
-    }
-
-    fn now(&self) -> f64 {
-        self.inner.now()
-    }
-
-    fn send(&mut self, destination: usize, tag: u32, message: Vec<u8>) -> Result<(), CommError> {
-        self.inner.send(destination, tag, message)
-    }
-
-    fn post_recv(
-        &mut self,
-        source: usize,
-        tag: u32,
-        capacity: usize,
-    ) -> Result<Receive, CommError> {
-        self.requested_bytes = self.requested_bytes.saturating_add(capacity);
-        self.inner.post_recv(source, tag, capacity)
-    }
-
-    fn wait_any(
-        &mut self,
-        posted: &mut Vec<Receive>,
-        timeout: Duration,
-    ) -> Result<Arrival, CommError> {
-        self.inner.wait_any(posted, timeout)
-    }
-
-    fn barrier(&mut self, timeout: Duration) -> Result<(), CommError> {
-        self.inner.barrier(timeout)
-    }
-
-    fn all_gather(
-        &mut self,
-        mine: &[u8],
-        longest: usize,
-        timeout: Duration,
-    ) -> Result<Vec<Vec<u8>>, CommError> {
-        let mut message = mine.to_vec();
-        if self.rank() == LIAR {
-            (self.lie)(self.gathered, &mut message);
+    lie: impl Fn(usize, &mut Vec<u8>),
+) -> Meddling<impl FnMut(Outgoing, &mut Vec<u8>) -> bool> {
+    let is_liar = inner.rank() == LIAR;
+    Meddling::new(inner, move |outgoing, message| {
+        if let Outgoing::Gathered(number) = outgoing
+            && is_liar
+        {
+            lie(number, message);
         }
-        self.gathered += 1;
-        self.inner.all_gather(&message, longest, timeout)
-    }
-
-    fn abort(&mut self, reason: &str) {
-        self.inner.abort(reason);
-    }
-
-    fn buffer(&mut self, capacity: usize) -> Vec<u8> {
-        self.requested_bytes = self.requested_bytes.saturating_add(capacity);
-        self.inner.buffer(capacity)
-    }
-
-    fn recycle(&mut self, buffer: Vec<u8>) {
-        self.inner.recycle(buffer);
-    }
+        true
+    })
 }
 
 type Ended = (Result<(), CompositeError>, usize);
@@ -106,7 +45,7 @@ fn with_rect(rect: [u32; 4], options: &Options) -> Vec<Ended> {
         }
     };
     let results = threads::run(3, |comm| {
-        let mut comm = Lying { inner: comm, lie, gathered: 0, requested_bytes: 0 };
+        let mut comm = lying(comm, lie);
         let (colors, depths) = ([[9_u8; 4]; PIXELS], [0.5; PIXELS]);
         let frame =
             Frame::<DepthPixel<[u8; 4]>>::with_depth(WIDTH, HEIGHT, &colors, &depths).unwrap();
@@ -174,7 +113,7 @@ fn fragment_counts_above_the_limit_are_rejected_without_allocation() {
         let ends: Vec<usize> = (1..=PIXELS).collect();
         let frame = DeepFrame::new(WIDTH, HEIGHT, &fragments, &ends).unwrap();
         let results = threads::run(3, |comm| {
-            let mut comm = Lying { inner: comm, lie, gathered: 0, requested_bytes: 0 };
+            let mut comm = lying(comm, lie);
             let result = composite_deep(&mut comm, &frame, &Options::default());
             (result.map(|_| ()), comm.requested_bytes)
         });
@@ -212,7 +151,7 @@ proptest! {
             }
         };
         let results = threads::run(3, |comm| {
-            let mut comm = Lying { inner: comm, lie: &lie, gathered: 0, requested_bytes: 0 };
+            let mut comm = lying(comm, &lie);
             let colors = [[0.5_f32; 4]; PIXELS];
             let frame = Frame::<PremultipliedPixel<[f32; 4]>>::premultiplied(WIDTH, HEIGHT, &colors).unwrap();
             let options = Options { timeout: Duration::from_millis(300), ..Options::default() };

@@ -23,8 +23,8 @@ const ALLOWED_DEPENDENCIES: &[(&str, May, &[&str])] = &[
     ("datasets", May::Use, &["rt-core"]),
     ("schlieren", May::Use, &["rt-core", "datasets"]),
     ("schlieren-python", May::Use, &["schlieren", "datasets", "rt-core-python-work"]),
-    ("composite", May::UseBehindAFeature, &["rt-core", "datasets"]),
-    ("composite-capi", May::Use, &["composite", "rt-core"]),
+    ("composite", May::UseBehindAFeature, &["rt-core", "datasets", "schlieren"]),
+    ("composite-capi", May::Use, &["composite", "rt-core", "schlieren"]),
     ("gluray", May::Use, &["rt-core", "composite", "datasets"]),
     // For the tests alone: they run programs with the shared library.
     ("gluray", May::UseBehindAFeature, &["gluray-interposer"]),

@@ -456,6 +456,93 @@ module rtsv_composite
     ! OpenGL's window depth, one per pixel; null if it was not asked for.
     type(c_ptr) :: depth = c_null_ptr
   end type
+  ! A gas on a lattice of points, without its densities. All ranks give the same.
+  type, bind(c) :: RtsvCompositeGas
+    ! Size of this structure.
+    integer(c_int64_t) :: struct_bytes = 88
+    ! Points per axis of the whole lattice.
+    integer(c_int32_t) :: dims(3) = 0
+    ! Not used; 0.
+    integer(c_int32_t) :: reserved = 0
+    ! Position of the first point, metres.
+    real(c_double) :: origin_m(3) = 0
+    ! Distance of neighbouring points, metres.
+    real(c_double) :: spacing_m(3) = 0
+    ! K of the law of Gladstone and Dale, n = 1 + K rho, m^3/kg: 2.26e-4 for air.
+    real(c_double) :: gladstone_dale = 0
+    ! Density of the gas outside, kg/m^3.
+    real(c_double) :: reference_density = 0
+  end type
+  ! A schlieren picture: a slit, and a knife's edge in the cut-off plane.
+  integer(c_int32_t), parameter :: RTSV_COMPOSITE_KNIFE = 0
+  ! A shadowgraph: no cut-off, and a film that is focused on a plane.
+  integer(c_int32_t), parameter :: RTSV_COMPOSITE_SHADOWGRAPH = 1
+  ! Gradients by central differences: needs one more layer of points around a brick's cells.
+  integer(c_int32_t), parameter :: RTSV_COMPOSITE_TRILINEAR_GRADIENT = 0
+  ! The gradient of linear interpolation, which jumps from cell to cell: needs no more layers.
+  integer(c_int32_t), parameter :: RTSV_COMPOSITE_TRILINEAR = 1
+  ! How a gas is photographed; the same on all ranks but for timeout_secs and threads.
+  ! rtsv_composite_shot_init fills it: schlieren along z, 512 x 512 pixels that show the whole
+  ! gas.
+  type, bind(c) :: RtsvCompositeShot
+    ! Size of this structure.
+    integer(c_int64_t) :: struct_bytes = 144
+    ! Pixels per row.
+    integer(c_int32_t) :: width = 0
+    ! Rows.
+    integer(c_int32_t) :: height = 0
+    ! RTSV_COMPOSITE_KNIFE or RTSV_COMPOSITE_SHADOWGRAPH.
+    integer(c_int32_t) :: technique = 0
+    ! RTSV_COMPOSITE_TRILINEAR_GRADIENT (the default) or RTSV_COMPOSITE_TRILINEAR.
+    integer(c_int32_t) :: interpolant = 0
+    ! The rank that gets the picture (0).
+    integer(c_int32_t) :: root = 0
+    ! 0 (the default) or 1: use all processors that the process may, not one thread for a rank.
+    integer(c_int32_t) :: threads = 0
+    ! Direction of the light, towards the film.
+    real(c_double) :: direction(3) = 0
+    ! What is up in the picture.
+    real(c_double) :: up(3) = 0
+    ! Side of a pixel in the gas, metres; 0 (the default) for pixels that show the whole gas.
+    real(c_double) :: pixel_m = 0
+    ! Longest step of a ray, in distances of points (1).
+    real(c_double) :: step_voxels = 0
+    ! Knife: deflections in this direction brighten the picture, degrees counter-clockwise from
+    ! its right (0).
+    real(c_double) :: angle_deg = 0
+    ! Knife: width of the slit, across the edge (0.001).
+    real(c_double) :: slit_width_m = 0
+    ! Knife: focal length of both lenses (1.5).
+    real(c_double) :: focal_length_m = 0
+    ! Knife: fraction of the slit's image that is left open, the brightness without gas (0.5).
+    real(c_double) :: open_fraction = 0
+    ! Shadowgraph: distance of the plane in focus from the centre of the gas, along the light.
+    real(c_double) :: focus_m = 0
+    ! Longest wait for a rank that gives no sign of life, seconds (60).
+    real(c_double) :: timeout_secs = 0
+  end type
+  ! A photograph. Rows start at the top.
+  type, bind(c) :: RtsvCompositePhotograph
+    ! Size of this structure; set it before the call.
+    integer(c_int64_t) :: struct_bytes = 64
+    ! Memory of the program for a float per pixel, which the call fills on the root: 1 for all
+    ! light of the slit. Set it before the call; not used on other ranks.
+    type(c_ptr) :: grey = c_null_ptr
+    ! Floats that fit there; set it before the call.
+    integer(c_int64_t) :: grey_count = 0
+    ! Rays that this rank sent to others.
+    integer(c_int64_t) :: rays_sent = 0
+    ! Rays that ended at a density that is no finite number; on the root.
+    integer(c_int64_t) :: masked = 0
+    ! Rays that were turned back; on the root.
+    integer(c_int64_t) :: turned = 0
+    ! Bytes that this rank sent.
+    integer(c_int64_t) :: bytes_sent = 0
+    ! Rounds of rays that went from brick to brick.
+    integer(c_int32_t) :: rounds = 0
+    ! Copies of the densities that this rank made: none.
+    integer(c_int32_t) :: copies = 0
+  end type
 
   interface
     function rtsv_composite_last_error() &
@@ -705,6 +792,23 @@ module rtsv_composite
         result(status) bind(c)
       import
       type(c_ptr), value :: renderer
+      integer(c_int32_t) :: status
+    end function
+    function rtsv_composite_shot_init(shot, struct_bytes) &
+        result(status) bind(c)
+      import
+      type(RtsvCompositeShot), intent(inout), optional :: shot
+      integer(c_int64_t), value :: struct_bytes
+      integer(c_int32_t) :: status
+    end function
+    function rtsv_composite_photograph(comm, gas, brick, shot, photograph) &
+        result(status) bind(c)
+      import
+      type(c_ptr), value :: comm
+      type(RtsvCompositeGas), intent(in), optional :: gas
+      type(RtsvCompositeBrick), intent(in), optional :: brick
+      type(RtsvCompositeShot), intent(in), optional :: shot
+      type(RtsvCompositePhotograph), intent(inout), optional :: photograph
       integer(c_int32_t) :: status
     end function
   end interface

@@ -469,6 +469,93 @@ typedef struct RtsvCompositePicture {
   /* OpenGL's window depth, one per pixel; null if it was not asked for. */
   float const* depth;
 } RtsvCompositePicture;
+/* A gas on a lattice of points, without its densities. All ranks give the same. */
+typedef struct RtsvCompositeGas {
+  /* Size of this structure. */
+  uint64_t struct_bytes;
+  /* Points per axis of the whole lattice. */
+  uint32_t dims[3];
+  /* Not used; 0. */
+  uint32_t reserved;
+  /* Position of the first point, metres. */
+  double origin_m[3];
+  /* Distance of neighbouring points, metres. */
+  double spacing_m[3];
+  /* K of the law of Gladstone and Dale, n = 1 + K rho, m^3/kg: 2.26e-4 for air. */
+  double gladstone_dale;
+  /* Density of the gas outside, kg/m^3. */
+  double reference_density;
+} RtsvCompositeGas;
+/* A schlieren picture: a slit, and a knife's edge in the cut-off plane. */
+#define RTSV_COMPOSITE_KNIFE 0u
+/* A shadowgraph: no cut-off, and a film that is focused on a plane. */
+#define RTSV_COMPOSITE_SHADOWGRAPH 1u
+/* Gradients by central differences: needs one more layer of points around a brick's cells. */
+#define RTSV_COMPOSITE_TRILINEAR_GRADIENT 0u
+/* The gradient of linear interpolation, which jumps from cell to cell: needs no more layers. */
+#define RTSV_COMPOSITE_TRILINEAR 1u
+/* How a gas is photographed; the same on all ranks but for timeout_secs and threads.
+ * rtsv_composite_shot_init fills it: schlieren along z, 512 x 512 pixels that show the whole
+ * gas. */
+typedef struct RtsvCompositeShot {
+  /* Size of this structure. */
+  uint64_t struct_bytes;
+  /* Pixels per row. */
+  uint32_t width;
+  /* Rows. */
+  uint32_t height;
+  /* RTSV_COMPOSITE_KNIFE or RTSV_COMPOSITE_SHADOWGRAPH. */
+  uint32_t technique;
+  /* RTSV_COMPOSITE_TRILINEAR_GRADIENT (the default) or RTSV_COMPOSITE_TRILINEAR. */
+  uint32_t interpolant;
+  /* The rank that gets the picture (0). */
+  uint32_t root;
+  /* 0 (the default) or 1: use all processors that the process may, not one thread for a rank. */
+  uint32_t threads;
+  /* Direction of the light, towards the film. */
+  double direction[3];
+  /* What is up in the picture. */
+  double up[3];
+  /* Side of a pixel in the gas, metres; 0 (the default) for pixels that show the whole gas. */
+  double pixel_m;
+  /* Longest step of a ray, in distances of points (1). */
+  double step_voxels;
+  /* Knife: deflections in this direction brighten the picture, degrees counter-clockwise from
+   * its right (0). */
+  double angle_deg;
+  /* Knife: width of the slit, across the edge (0.001). */
+  double slit_width_m;
+  /* Knife: focal length of both lenses (1.5). */
+  double focal_length_m;
+  /* Knife: fraction of the slit's image that is left open, the brightness without gas (0.5). */
+  double open_fraction;
+  /* Shadowgraph: distance of the plane in focus from the centre of the gas, along the light. */
+  double focus_m;
+  /* Longest wait for a rank that gives no sign of life, seconds (60). */
+  double timeout_secs;
+} RtsvCompositeShot;
+/* A photograph. Rows start at the top. */
+typedef struct RtsvCompositePhotograph {
+  /* Size of this structure; set it before the call. */
+  uint64_t struct_bytes;
+  /* Memory of the program for a float per pixel, which the call fills on the root: 1 for all
+   * light of the slit. Set it before the call; not used on other ranks. */
+  float* grey;
+  /* Floats that fit there; set it before the call. */
+  uint64_t grey_count;
+  /* Rays that this rank sent to others. */
+  uint64_t rays_sent;
+  /* Rays that ended at a density that is no finite number; on the root. */
+  uint64_t masked;
+  /* Rays that were turned back; on the root. */
+  uint64_t turned;
+  /* Bytes that this rank sent. */
+  uint64_t bytes_sent;
+  /* Rounds of rays that went from brick to brick. */
+  uint32_t rounds;
+  /* Copies of the densities that this rank made: none. */
+  uint32_t copies;
+} RtsvCompositePhotograph;
 /* Why the last call of this thread that failed did so; empty before. English, one line, UTF-8.
  * It belongs to the library until the next failure of this thread. */
 char const* rtsv_composite_last_error(void);
@@ -615,6 +702,20 @@ RtsvCompositeStatus rtsv_composite_renderer_warnings(
     char const** text);
 /* Frees a renderer and its picture; null is allowed. */
 RtsvCompositeStatus rtsv_composite_renderer_free(RtsvCompositeRenderer* renderer);
+/* Fills a shot; struct_bytes is sizeof of the structure. */
+RtsvCompositeStatus rtsv_composite_shot_init(RtsvCompositeShot* shot, uint64_t struct_bytes);
+/* Collective: photographs a gas of which every rank gives a brick (or null for none): light that
+ * is bent by differences of density, also across the borders of bricks. Bricks of neighbours
+ * share the points between them, and overlap by one layer of points more on either side for
+ * RTSV_COMPOSITE_TRILINEAR_GRADIENT; points that several ranks have are the same on all. values
+ * of a brick are densities, kg/m^3, which are read where they are and not copied, and may have
+ * any strides; what is no finite number blocks light. The picture has the bits of one process. */
+RtsvCompositeStatus rtsv_composite_photograph(
+    RtsvCompositeComm* comm,
+    RtsvCompositeGas const* gas,
+    RtsvCompositeBrick const* brick,
+    RtsvCompositeShot const* shot,
+    RtsvCompositePhotograph* photograph);
 
 #ifdef __cplusplus
 }

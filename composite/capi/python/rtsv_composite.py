@@ -560,6 +560,106 @@ class Picture(_Structure):
     ]
 
 
+
+class Gas(_Structure):
+    # A gas on a lattice of points, without its densities. All ranks give the same.
+    _fields_ = [
+        # Size of this structure.
+        ("struct_bytes", ctypes.c_uint64),
+        # Points per axis of the whole lattice.
+        ("dims", ctypes.c_uint32 * 3),
+        # Not used; 0.
+        ("reserved", ctypes.c_uint32),
+        # Position of the first point, metres.
+        ("origin_m", ctypes.c_double * 3),
+        # Distance of neighbouring points, metres.
+        ("spacing_m", ctypes.c_double * 3),
+        # K of the law of Gladstone and Dale, n = 1 + K rho, m^3/kg: 2.26e-4 for air.
+        ("gladstone_dale", ctypes.c_double),
+        # Density of the gas outside, kg/m^3.
+        ("reference_density", ctypes.c_double),
+    ]
+
+# A schlieren picture: a slit, and a knife's edge in the cut-off plane.
+KNIFE = 0
+# A shadowgraph: no cut-off, and a film that is focused on a plane.
+SHADOWGRAPH = 1
+# Gradients by central differences: needs one more layer of points around a brick's cells.
+TRILINEAR_GRADIENT = 0
+# The gradient of linear interpolation, which jumps from cell to cell: needs no more layers.
+TRILINEAR = 1
+
+
+class Shot(_Structure):
+    # How a gas is photographed; the same on all ranks but for timeout_secs and threads.
+    # rtsv_composite_shot_init fills it: schlieren along z, 512 x 512 pixels that show the whole
+    # gas.
+    _fields_ = [
+        # Size of this structure.
+        ("struct_bytes", ctypes.c_uint64),
+        # Pixels per row.
+        ("width", ctypes.c_uint32),
+        # Rows.
+        ("height", ctypes.c_uint32),
+        # RTSV_COMPOSITE_KNIFE or RTSV_COMPOSITE_SHADOWGRAPH.
+        ("technique", ctypes.c_uint32),
+        # RTSV_COMPOSITE_TRILINEAR_GRADIENT (the default) or RTSV_COMPOSITE_TRILINEAR.
+        ("interpolant", ctypes.c_uint32),
+        # The rank that gets the picture (0).
+        ("root", ctypes.c_uint32),
+        # 0 (the default) or 1: use all processors that the process may, not one thread for a
+        # rank.
+        ("threads", ctypes.c_uint32),
+        # Direction of the light, towards the film.
+        ("direction", ctypes.c_double * 3),
+        # What is up in the picture.
+        ("up", ctypes.c_double * 3),
+        # Side of a pixel in the gas, metres; 0 (the default) for pixels that show the whole gas.
+        ("pixel_m", ctypes.c_double),
+        # Longest step of a ray, in distances of points (1).
+        ("step_voxels", ctypes.c_double),
+        # Knife: deflections in this direction brighten the picture, degrees counter-clockwise
+        # from its right (0).
+        ("angle_deg", ctypes.c_double),
+        # Knife: width of the slit, across the edge (0.001).
+        ("slit_width_m", ctypes.c_double),
+        # Knife: focal length of both lenses (1.5).
+        ("focal_length_m", ctypes.c_double),
+        # Knife: fraction of the slit's image that is left open, the brightness without gas (0.5).
+        ("open_fraction", ctypes.c_double),
+        # Shadowgraph: distance of the plane in focus from the centre of the gas, along the light.
+        ("focus_m", ctypes.c_double),
+        # Longest wait for a rank that gives no sign of life, seconds (60).
+        ("timeout_secs", ctypes.c_double),
+    ]
+
+
+
+class Photograph(_Structure):
+    # A photograph. Rows start at the top.
+    _fields_ = [
+        # Size of this structure; set it before the call.
+        ("struct_bytes", ctypes.c_uint64),
+        # Memory of the program for a float per pixel, which the call fills on the root: 1 for all
+        # light of the slit. Set it before the call; not used on other ranks.
+        ("grey", ctypes.POINTER(ctypes.c_float)),
+        # Floats that fit there; set it before the call.
+        ("grey_count", ctypes.c_uint64),
+        # Rays that this rank sent to others.
+        ("rays_sent", ctypes.c_uint64),
+        # Rays that ended at a density that is no finite number; on the root.
+        ("masked", ctypes.c_uint64),
+        # Rays that were turned back; on the root.
+        ("turned", ctypes.c_uint64),
+        # Bytes that this rank sent.
+        ("bytes_sent", ctypes.c_uint64),
+        # Rounds of rays that went from brick to brick.
+        ("rounds", ctypes.c_uint32),
+        # Copies of the densities that this rank made: none.
+        ("copies", ctypes.c_uint32),
+    ]
+
+
 # Why the last call of this thread that failed did so; empty before. English, one line, UTF-8. It
 # belongs to the library until the next failure of this thread.
 last_error = _library.rtsv_composite_last_error
@@ -855,3 +955,25 @@ renderer_free.argtypes = [
 ]
 renderer_free.errcheck = _check
 renderer_free.restype = ctypes.c_uint32
+
+# Fills a shot; struct_bytes is sizeof of the structure.
+shot_init = _library.rtsv_composite_shot_init
+shot_init.argtypes = [
+    ctypes.POINTER(Shot), ctypes.c_uint64
+]
+shot_init.errcheck = _check
+shot_init.restype = ctypes.c_uint32
+
+# Collective: photographs a gas of which every rank gives a brick (or null for none): light that
+# is bent by differences of density, also across the borders of bricks. Bricks of neighbours share
+# the points between them, and overlap by one layer of points more on either side for
+# RTSV_COMPOSITE_TRILINEAR_GRADIENT; points that several ranks have are the same on all. values of
+# a brick are densities, kg/m^3, which are read where they are and not copied, and may have any
+# strides; what is no finite number blocks light. The picture has the bits of one process.
+photograph = _library.rtsv_composite_photograph
+photograph.argtypes = [
+    ctypes.c_void_p, ctypes.POINTER(Gas), ctypes.POINTER(Brick), ctypes.POINTER(Shot),
+    ctypes.POINTER(Photograph)
+]
+photograph.errcheck = _check
+photograph.restype = ctypes.c_uint32

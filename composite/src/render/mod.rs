@@ -46,6 +46,8 @@ mod demo_pieces;
 mod distributed;
 mod error;
 pub mod ghost;
+#[cfg(feature = "light")]
+pub mod light;
 mod options;
 mod partition;
 mod primary_rays;

@@ -3,6 +3,7 @@
 use super::wire_format::{decode_message, encode_message, message_bytes};
 use super::{Activity, FrameError, RankReport};
 use crate::comm::{Communicator, Receive};
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Duration;
 
@@ -11,6 +12,9 @@ const LOOK: Duration = Duration::from_millis(20);
 
 /// Most words that a rank may give to all ranks: 16 MiB.
 const MOST_GATHERED: usize = 1 << 22;
+/// Words of one message of a long request: 4 MiB. A rank that announces more than it sends makes
+/// the others ask for no more memory than this at a time.
+const PIECE: usize = 1 << 20;
 /// Longest description of a problem, bytes.
 const LONGEST_PROBLEM: usize = 2000;
 
@@ -167,6 +171,56 @@ impl<'a> RankChannel<'a> {
         Ok(())
     }
 
+    /// Sends a request of any length, in pieces.
+    pub(super) fn send_request(&mut self, to: usize, words: &[u32]) -> Result<(), FrameError> {
+        words.chunks(PIECE).try_for_each(|piece| self.send(to, Tag::Request, piece))
+    }
+
+    /// Receives one request from each of `sources` (rank and announced words), in any order, and
+    /// passes them to `take`. Memory for a long one is taken as its pieces arrive.
+    pub(super) fn receive_requests(
+        &mut self,
+        what: &'static str,
+        sources: impl IntoIterator<Item = (usize, usize)>,
+        mut take: impl FnMut(&mut Self, usize, Vec<u32>) -> Result<(), FrameError>,
+    ) -> Result<(), FrameError> {
+        const TAG: u32 = Tag::Request as u32;
+        let mut posted = Vec::new();
+        let mut arriving: BTreeMap<usize, (usize, Vec<u32>)> = BTreeMap::new();
+        for (source, words) in sources {
+            posted.push(self.comm.post_recv(source, TAG, message_bytes(words.min(PIECE)))?);
+            arriving.insert(source, (words, Vec::new()));
+        }
+        while !posted.is_empty() {
+            let arrival = self.comm.wait_any(&mut posted, self.timeout)?;
+            self.report.bytes_received += arrival.message.len() as u64;
+            self.record_span(Activity::Exchange);
+            let (from, bytes) = (arrival.source, arrival.message.len());
+            let piece = decode_message(&arrival.message);
+            self.comm.recycle(arrival.message);
+            let known = piece.zip(arriving.remove(&from));
+            let (piece, (announced, mut words)) =
+                known.ok_or_else(|| self.message_error(from, what, bytes / 4))?;
+            let is_whole = piece.len() == (announced - words.len()).min(PIECE);
+            words.extend(piece);
+            if !is_whole {
+                let reason = format!(
+                    "{what}: a question of {announced} words was announced, and one of {} came",
+                    words.len()
+                );
+                return Err(self.announced_error(from, reason));
+            }
+            let left = announced - words.len();
+            if left == 0 {
+                take(self, from, words)?;
+                continue;
+            }
+            posted.push(self.comm.post_recv(from, TAG, message_bytes(left.min(PIECE)))?);
+            arriving.insert(from, (announced, words));
+        }
+        Ok(())
+    }
+
     /// Posts a receive for a message of at most `words` words. Those of one rank and tag arrive in
     /// the order in which they were posted.
     pub(super) fn expect(
@@ -297,7 +351,7 @@ impl<'a> RankChannel<'a> {
         for step in 1..size {
             let to = (rank + step) % size;
             if !requests[to].is_empty() {
-                self.send(to, Tag::Request, &requests[to])?;
+                self.send_request(to, &requests[to])?;
             }
         }
         self.record_span(Activity::Exchange);
@@ -312,15 +366,7 @@ impl<'a> RankChannel<'a> {
         let asked_by = (0..size).filter(|&from| from != rank && lengths[from][rank] > 0);
         let sources: Vec<(usize, usize)> =
             asked_by.map(|from| (from, lengths[from][rank] as usize)).collect();
-        self.receive(Tag::Request, what, sources, |channel, from, request| {
-            let announced = lengths[from][rank] as usize;
-            if request.len() != announced {
-                let reason = format!(
-                    "{what}: a question of {announced} words was announced, and one of {} came",
-                    request.len()
-                );
-                return Err(channel.announced_error(from, reason));
-            }
+        self.receive_requests(what, sources, |channel, from, request| {
             let reply = answer(&mut channel.report, &request);
             channel.record_span(Activity::Answer);
             let reply = reply.ok_or_else(|| channel.message_error(from, what, request.len()))?;
@@ -341,5 +387,39 @@ impl<'a> RankChannel<'a> {
     /// Aborts the group.
     pub(super) fn abort(&mut self, reason: &str) {
         self.comm.abort(reason);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::comm::threads;
+
+    #[test]
+    fn requests_of_any_length_arrive_whole_and_in_order() {
+        let lengths = [1, PIECE - 1, PIECE, PIECE + 1, 2 * PIECE + 5];
+        let results = threads::run(2, |mut comm| {
+            let mut channel = RankChannel::new(&mut comm, Duration::from_secs(20));
+            for length in lengths {
+                let mut requests = vec![Vec::new(); 2];
+                requests[1 - channel.rank()] = (0..length as u32).collect();
+                let mut came = false;
+                let sum = |words: &[u32]| words.iter().fold(0_u32, |s, w| s.rotate_left(1) ^ w);
+                let answer = |_: &mut RankReport, words: &[u32]| Some(vec![sum(words)]);
+                let expected = sum(&requests[1 - channel.rank()]);
+                let any = channel.request_reply(
+                    "sums",
+                    &requests,
+                    |_| 1,
+                    answer,
+                    |_, reply| {
+                        came = reply == [expected];
+                        Ok(())
+                    },
+                );
+                assert!(any.expect("no error") && came, "{length}");
+            }
+        });
+        results.into_iter().for_each(|result| result.expect("no rank panics"));
     }
 }

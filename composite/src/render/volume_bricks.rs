@@ -271,7 +271,7 @@ fn blocks_needed(
 }
 
 /// A block of `whole` that is in none of `bricks`.
-fn first_outside(whole: Brick, bricks: &[Brick]) -> Option<UVec3> {
+pub(super) fn first_outside(whole: Brick, bricks: &[Brick]) -> Option<UVec3> {
     if whole.is_empty() {
         return None;
     }

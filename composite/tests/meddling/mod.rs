@@ -19,11 +19,14 @@ pub(crate) struct Meddling<F> {
     meddle: F,
     messages: usize,
     gathered: usize,
+    /// Bytes of the receives and buffers that this rank has asked for.
+    #[allow(dead_code, reason = "some tests do not count memory")]
+    pub(crate) requested_bytes: usize,
 }
 
 impl<F: FnMut(Outgoing, &mut Vec<u8>) -> bool> Meddling<F> {
     pub(crate) fn new(inner: threads::ThreadComm, meddle: F) -> Self {
-        Self { inner, meddle, messages: 0, gathered: 0 }
+        Self { inner, meddle, messages: 0, gathered: 0, requested_bytes: 0 }
     }
 }
 
@@ -51,7 +54,12 @@ impl<F: FnMut(Outgoing, &mut Vec<u8>) -> bool> Communicator for Meddling<F> {
     }
 
     fn post_recv(&mut self, from: usize, tag: u32, capacity: usize) -> Result<Receive, CommError> {
+        self.requested_bytes = self.requested_bytes.saturating_add(capacity);
         self.inner.post_recv(from, tag, capacity)
+    }
+
+    fn test_any(&mut self, posted: &mut Vec<Receive>) -> Result<Option<Arrival>, CommError> {
+        self.inner.test_any(posted)
     }
 
     fn wait_any(
@@ -80,5 +88,14 @@ impl<F: FnMut(Outgoing, &mut Vec<u8>) -> bool> Communicator for Meddling<F> {
 
     fn abort(&mut self, reason: &str) {
         self.inner.abort(reason);
+    }
+
+    fn buffer(&mut self, capacity: usize) -> Vec<u8> {
+        self.requested_bytes = self.requested_bytes.saturating_add(capacity);
+        self.inner.buffer(capacity)
+    }
+
+    fn recycle(&mut self, buffer: Vec<u8>) {
+        self.inner.recycle(buffer);
     }
 }

@@ -1,6 +1,7 @@
 //! `composite demo`: its images over threads, simulated ranks and MPI, and the input it rejects.
 
 use super::program::{peer, run};
+use super::simulated_program;
 use std::path::Path;
 
 #[test]
@@ -269,6 +270,15 @@ fn pieces_that_ranks_read_by_themselves_give_one_picture_over_every_transport() 
                 picture(file, &[&["--mpi", "-n", "3"], more].concat(), &launcher);
             assert!(shown["transport"].as_str().is_some_and(|t| t.contains(name)), "{shown}");
             assert!(one == over_mpi, "{file} {more:?} over {name}: the images differ");
+        }
+        if peer("RTSV_SMPIRUN").is_some() {
+            let library = simulated_program();
+            let variables: Vec<(&str, &Path)> =
+                library.iter().map(|(name, path)| (*name, path.as_path())).collect();
+            let simulated = [&["--smpi", "-n", "16"], more].concat();
+            let (sixteen, shown) = picture(file, &simulated, &variables);
+            assert_eq!(shown["ranks"].as_array().map(Vec::len), Some(16), "{shown}");
+            assert!(one == sixteen, "{file} {more:?} on 16 ranks of SMPI: the images differ");
         }
     }
     // ---- Errors name the rank and the file.

@@ -106,7 +106,7 @@ fn messages_cut_into_chunks_arrive_whole_and_in_order() {
 
 /// The shared library if cargo has built it with this test (`cargo test --workspace` does);
 /// otherwise the program builds it.
-fn simulated_program() -> Vec<(&'static str, PathBuf)> {
+pub(crate) fn simulated_program() -> Vec<(&'static str, PathBuf)> {
     let program = Path::new(env!("CARGO_BIN_EXE_composite"));
     let folder = program.parent().expect("a program is in a folder");
     let places =

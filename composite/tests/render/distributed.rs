@@ -22,7 +22,7 @@ use std::time::Duration;
 
 /// What one of many ranks has of a scene: the `rank`th run of primitives of each geometry, and a
 /// brick of each volume with `ghosts` layers of points around it.
-fn share(scene: &Scene, rank: usize, ranks: usize, ghosts: u32) -> RankScene {
+pub(crate) fn share(scene: &Scene, rank: usize, ranks: usize, ghosts: u32) -> RankScene {
     let mut out = settings_of(scene);
     for (g, geometry) in scene.world.geometries().iter().enumerate() {
         let n = geometry.num_primitives();

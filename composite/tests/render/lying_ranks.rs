@@ -1,10 +1,11 @@
 //! Ranks that announce other numbers than they send are rejected by name, early enough.
+use crate::meddling::{Meddling, Outgoing};
+use crate::words::change_words;
 use crate::{frame_options, scenes};
-use composite::comm::{Arrival, Receive};
 use composite::render::{
     DataParallel, FrameError, FrameOptions, Partition, RankScene, SecondaryRayPolicy, Split,
 };
-use composite::{CommError, Communicator, threads};
+use composite::{Communicator, threads};
 use rt_core::bvh::BuildOptions;
 use rt_core::glam::DVec3;
 use std::time::Duration;
@@ -17,90 +18,16 @@ const GHOST_NUMBERS: usize = RANKS + 2;
 const LENGTHS: usize = RANKS;
 
 /// A communicator whose rank [`LIAR`] falsifies the numbers that it gathers, with a valid checksum.
-struct Lying<F> {
+fn lying(
     inner: threads::ThreadComm,
-    lie: F,
-}
-
-impl<F: Fn(&mut [u32])> Communicator for Lying<F> {
-    fn rank(&self) -> usize {
-        self.inner.rank()
-    }
-
-    fn size(&self) -> usize {
-        self.inner.size()
-    }
-
-    fn now(&self) -> f64 {
-        self.inner.now()
-    }
-
-    fn send(&mut self, destination: usize, tag: u32, message: Vec<u8>) -> Result<(), CommError> {
-        self.inner.send(destination, tag, message)
-    }
-
-    fn post_recv(
-        &mut self,
-        source: usize,
-        tag: u32,
-        capacity: usize,
-    ) -> Result<Receive, CommError> {
-        self.inner.post_recv(source, tag, capacity)
-    }
-
-    fn wait_any(
-        &mut self,
-        posted: &mut Vec<Receive>,
-        timeout: Duration,
-    ) -> Result<Arrival, CommError> {
-        self.inner.wait_any(posted, timeout)
-    }
-
-    fn test_any(&mut self, posted: &mut Vec<Receive>) -> Result<Option<Arrival>, CommError> {
-        self.inner.test_any(posted)
-    }
-
-    fn barrier(&mut self, timeout: Duration) -> Result<(), CommError> {
-        self.inner.barrier(timeout)
-    }
-
-    fn all_gather(
-        &mut self,
-        mine: &[u8],
-        longest: usize,
-        timeout: Duration,
-    ) -> Result<Vec<Vec<u8>>, CommError> {
-        if self.rank() != LIAR {
-            return self.inner.all_gather(mine, longest, timeout);
+    lie: impl Fn(&mut [u32]),
+) -> Meddling<impl FnMut(Outgoing, &mut Vec<u8>) -> bool> {
+    let is_liar = inner.rank() == LIAR;
+    Meddling::new(inner, move |outgoing, message| {
+        if is_liar && matches!(outgoing, Outgoing::Gathered(_)) {
+            change_words(message, |words| lie(words));
         }
-        let mut words: Vec<u32> =
-            mine[8..].as_chunks::<4>().0.iter().map(|c| u32::from_le_bytes(*c)).collect();
-        let truth = words.clone();
-        (self.lie)(&mut words);
-        if words == truth {
-            return self.inner.all_gather(mine, longest, timeout);
-        }
-        let body: Vec<u8> = words.iter().flat_map(|w| w.to_le_bytes()).collect();
-        let said = [&checksum(&body).to_le_bytes()[..], &body].concat();
-        self.inner.all_gather(&said, longest, timeout)
-    }
-
-    fn abort(&mut self, reason: &str) {
-        self.inner.abort(reason);
-    }
-}
-
-/// The checksum in front of a short message. Unchanged numbers must pass with it: see below.
-fn checksum(body: &[u8]) -> u64 {
-    let mix = |state: u64, value: u64| {
-        (state ^ value).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29)
-    };
-    assert!(body.len() < 64, "longer messages have more chains");
-    let state = (0..8).fold(body.len() as u64, mix);
-    body.chunks(8).fold(state, |state, chunk| {
-        let mut whole = [0; 8];
-        whole[..chunk.len()].copy_from_slice(chunk);
-        mix(state, u64::from_le_bytes(whole))
+        true
     })
 }
 
@@ -109,7 +36,7 @@ fn frame(policy: SecondaryRayPolicy, lie: impl Fn(&mut [u32]) + Sync) -> Vec<Opt
     let case = scenes::occlusion_alone();
     let partition = Partition::new(&case.scene, RANKS, &Split::Triangles);
     let results = threads::run(RANKS, |inner| {
-        let mut comm = Lying { inner, lie: &lie };
+        let mut comm = lying(inner, &lie);
         let options = FrameOptions { timeout: Duration::from_secs(5), ..frame_options(policy) };
         let part = partition.part(&case.scene, comm.rank(), &BuildOptions::default())?;
         let mut renderer = DataParallel::new(&mut comm, part, options)?;
@@ -143,7 +70,7 @@ fn bounds_that_are_no_numbers_are_refused_by_the_name_of_their_rank() {
                     words[1] = lied.to_bits();
                 }
             };
-            let mut comm = Lying { inner, lie };
+            let mut comm = lying(inner, lie);
             let mut scene = RankScene::new();
             let matte = scene.material(scenes::matte());
             scene.mesh("ground", scenes::bumps(DVec3::ZERO, 6), matte);

@@ -1,9 +1,16 @@
 //! The image of many ranks equals the image of one node, bit for bit.
 mod distributed;
 mod lying_ranks;
+#[path = "../meddling/mod.rs"]
+mod meddling;
+mod mutated_messages;
+#[path = "../meddling/mutation.rs"]
+mod mutation;
 mod scenes;
 mod unreadable_shapes;
 mod volumes;
+#[path = "../meddling/words.rs"]
+mod words;
 
 use composite::comm::sim;
 use composite::render::{

@@ -11,6 +11,7 @@
 pub mod beams;
 pub mod photons;
 mod tile;
+pub mod traced;
 
 pub(crate) use tile::{PhotonTile, TILE};
 

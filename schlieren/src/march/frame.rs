@@ -57,13 +57,21 @@ pub(crate) struct UndisturbedRay {
 
 impl Frame {
     pub(crate) fn new(field: &Field, view: View) -> Frame {
-        let spacing_m = DVec3::from(field.spacing_m());
-        let d = field.dims();
+        Frame::of_lattice(field.dims(), field.spacing_m(), field.origin_m(), view)
+    }
+
+    pub(crate) fn of_lattice(
+        dims: [usize; 3],
+        spacing_m: [f64; 3],
+        origin_m: DVec3,
+        view: View,
+    ) -> Frame {
+        let spacing_m = DVec3::from(spacing_m);
         Frame {
             view,
             spacing_m,
-            last: DVec3::new((d[0] - 1) as f64, (d[1] - 1) as f64, (d[2] - 1) as f64),
-            centre: (view.centre_m - field.origin_m()) / spacing_m,
+            last: DVec3::from(dims.map(|nodes| (nodes - 1) as f64)),
+            centre: (view.centre_m - origin_m) / spacing_m,
             unit_m: spacing_m.max_element().log2().round().exp2(),
         }
     }

@@ -140,6 +140,6 @@ impl KernelRay {
 
 /// Number of whole steps for a length in steps. A tiny excess over a whole number is rounding and
 /// adds no step.
-fn steps_of(steps: f64) -> u32 {
+pub(super) fn steps_of(steps: f64) -> u32 {
     (steps * (1.0 - 1e-12)).ceil() as u32
 }

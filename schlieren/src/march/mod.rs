@@ -7,6 +7,7 @@
 //! | [`Deviational`] (Verlet) | gases: the default | one sample per step, `f32`, 16 rays at once |
 //! | [`Deviational`] (Euler) | comparison with the dissertation (equations 5.7, 5.8) | the same |
 //! | [`Full`] | lenses, liquids, turning rays | one to six samples per step, `f64` |
+//! | [`InBricks`] (Verlet) | lattices that no process has whole | one sample per step, `f64` |
 //! | [`OnCells`] (Verlet) | meshes without a lattice | one sample per cell or more, `f64` |
 //!
 //! Two more integrators are references for measuring the errors of these. [`DormandPrince`] is
@@ -20,6 +21,7 @@ mod euler;
 mod field_cache;
 mod frame;
 mod full;
+mod in_bricks;
 mod integrator;
 mod kernel_ray;
 mod line_of_sight;
@@ -38,6 +40,7 @@ pub use field_cache::{FieldCache, Projection};
 pub use frame::BlankCells;
 pub(crate) use frame::Frame;
 pub use full::{Full, FullOptions};
+pub use in_bricks::{Brick, InBricks, InBricksError, Lattice, Progress, RayState, Stencil};
 pub use integrator::{Integrator, InterpolatedMedium, Medium, Ray};
 #[cfg(feature = "gpu")]
 pub(crate) use kernel_ray::KernelOutput;

@@ -1,5 +1,6 @@
 //! Structures and arrays in memory of the program: read at the calls, never kept.
 
+use super::light_types::*;
 use super::scene_types::*;
 use super::status::Failure;
 use super::types::*;
@@ -32,7 +33,10 @@ sized!(
     RtsvCompositeBrick,
     RtsvCompositeRenderOptions,
     RtsvCompositeView,
-    RtsvCompositePicture
+    RtsvCompositePicture,
+    RtsvCompositeGas,
+    RtsvCompositeShot,
+    RtsvCompositePhotograph
 );
 
 /// An error if `pointer` is null or not aligned.

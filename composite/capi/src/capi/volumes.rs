@@ -104,35 +104,10 @@ pub unsafe extern "C" fn rtsv_composite_scene_brick(
             };
             let shown = format!("volume `{}`", volume.name);
             let fault = |text: String| Failure::value(format!("{shown}: brick: {text}"));
+            let strides = strides_of(&b, NUMBERS).map_err(|f| fault(f.text))?;
+            let row = Tuples::new(&b.values, "values", 1, NUMBERS)?;
+            let Some(([_, along_y, along_z], values)) = strides.zip(row) else { return Ok(()) };
             let [nx, ny, nz] = b.dims.map(u64::from);
-            let points = nx.checked_mul(ny).and_then(|n| n.checked_mul(nz));
-            if points != Some(b.values.count) {
-                let (dims, count) = (b.dims, b.values.count);
-                return Err(fault(format!(
-                    "{count} values for {dims:?} points: give one for each"
-                )));
-            }
-            let row = Tuples::new(&b.values, "values", 1, NUMBERS).map_err(|f| fault(f.text))?;
-            let Some(values) = row else { return Ok(()) };
-            // The strides along y and z, in bytes of the program's memory.
-            let along_y = if b.row_bytes == 0 {
-                values.stride().checked_mul(nx as i64)
-            } else {
-                Some(b.row_bytes)
-            };
-            let along_z = if b.slice_bytes == 0 {
-                along_y.and_then(|y| y.checked_mul(ny as i64))
-            } else {
-                Some(b.slice_bytes)
-            };
-            let (Some(along_y), Some(along_z)) = (along_y, along_z) else {
-                return Err(fault("no memory is so large".to_owned()));
-            };
-            if !is_addressable(&[nx, ny, nz], &[values.stride(), along_y, along_z], 8) {
-                return Err(fault(format!(
-                    "rows {along_y} and slices {along_z} bytes apart: no memory is so large"
-                )));
-            }
             let mut numbers = Vec::with_capacity(b.values.count as usize);
             for z in 0..nz {
                 for y in 0..ny {
@@ -152,4 +127,42 @@ pub unsafe extern "C" fn rtsv_composite_scene_brick(
             Ok(())
         })
     })
+}
+
+/// Bytes from a value of a brick to the next along x, y and z, with numbers of `kinds`; `None` for
+/// a brick without points.
+pub(crate) fn strides_of(
+    b: &RtsvCompositeBrick,
+    kinds: &[u32],
+) -> Result<Option<[i64; 3]>, Failure> {
+    let [nx, ny, nz] = b.dims.map(u64::from);
+    let points = nx.checked_mul(ny).and_then(|n| n.checked_mul(nz));
+    if points != Some(b.values.count) {
+        let (dims, count) = (b.dims, b.values.count);
+        return Err(Failure::value(format!(
+            "{count} values for {dims:?} points: give one for each"
+        )));
+    }
+    // The strides of an array in three axes are not that of a list, which could not be addressed
+    // where values have gaps and rows overlap.
+    let row = RtsvCompositeArray { count: nx.min(b.values.count), ..b.values };
+    let Some(along_x) = Tuples::new(&row, "values", 1, kinds)?.map(|row| row.stride()) else {
+        return Ok(None);
+    };
+    let or_without_gaps = |given: i64, below: Option<i64>, count: u64| match given {
+        0 => below.and_then(|stride| stride.checked_mul(count as i64)),
+        given => Some(given),
+    };
+    let along_y = or_without_gaps(b.row_bytes, Some(along_x), nx);
+    let along_z = or_without_gaps(b.slice_bytes, along_y, ny);
+    let (Some(along_y), Some(along_z)) = (along_y, along_z) else {
+        return Err(Failure::value("no memory is so large"));
+    };
+    let strides = [along_x, along_y, along_z];
+    if !is_addressable(&[nx, ny, nz], &strides, 8) {
+        return Err(Failure::value(format!(
+            "rows {along_y} and slices {along_z} bytes apart: no memory is so large"
+        )));
+    }
+    Ok(Some(strides))
 }

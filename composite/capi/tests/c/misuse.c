@@ -412,6 +412,79 @@ static void scenes(void) {
   FINE(rtsv_composite_comm_free(group));
 }
 
+static void photographs(void) {
+  double density[27];
+  for (int k = 0; k < 27; ++k) density[k] = 1.2;
+  float grey[20] = {0};
+  int releases = 0;
+  RtsvCompositeGas gas = {.struct_bytes = sizeof gas, .dims = {3, 3, 3}};
+  gas.spacing_m[0] = gas.spacing_m[1] = gas.spacing_m[2] = 0.01;
+  gas.gladstone_dale = 2.26e-4, gas.reference_density = 1.2;
+  RtsvCompositeBrick brick = {.struct_bytes = sizeof brick, .dims = {3, 3, 3}};
+  brick.values = (RtsvCompositeArray){density, 27, 1, RTSV_COMPOSITE_F64, 0, release, &releases};
+  RtsvCompositeShot shot;
+  EXPECT(rtsv_composite_shot_init(NULL, sizeof shot), POINTER, "shot");
+  EXPECT(rtsv_composite_shot_init(&shot, 1), STRUCT, "Shot is 1");
+  FINE(rtsv_composite_shot_init(&shot, sizeof shot));
+  shot.width = 5, shot.height = 4;
+  RtsvCompositePhotograph photo = {.struct_bytes = sizeof photo, .grey = grey, .grey_count = 20};
+  int photographs = 0;
+#define BAD_PHOTO(change, wanted, words)                                              \
+  do {                                                                                \
+    RtsvCompositeComm* group = fresh();                                               \
+    RtsvCompositeGas g = gas, *gp = &g;                                               \
+    RtsvCompositeBrick b = brick;                                                     \
+    RtsvCompositeShot s = shot, *sp = &s;                                             \
+    RtsvCompositePhotograph p = photo, *pp = &p;                                      \
+    change;                                                                           \
+    EXPECT(rtsv_composite_photograph(group, gp, &b, sp, pp), wanted, words);          \
+    ++photographs;                                                                    \
+    FINE(rtsv_composite_comm_free(group));                                            \
+  } while (0)
+  BAD_PHOTO(gp = NULL, POINTER, "gas");
+  BAD_PHOTO(sp = NULL, POINTER, "shot");
+  BAD_PHOTO(pp = NULL, POINTER, "photograph");
+  BAD_PHOTO(p.grey = NULL, POINTER, "grey");
+  BAD_PHOTO(p.grey_count = 19, VALUE, "20 pixels");
+  BAD_PHOTO(p.struct_bytes = 3, STRUCT, "Photograph is 3");
+  BAD_PHOTO(g.struct_bytes = 3, STRUCT, "Gas is 3");
+  BAD_PHOTO(g.reserved = 3, VALUE, "reserved");
+  BAD_PHOTO(g.dims[1] = 0, DISAGREE, "along y");
+  BAD_PHOTO(g.dims[1] = 5, DISAGREE, "no rank has");
+  BAD_PHOTO(g.dims[0] = 2, DISAGREE, "the gas has [2, 3, 3] nodes");
+  BAD_PHOTO(g.spacing_m[2] = NAN, DISAGREE, "along z");
+  BAD_PHOTO(g.gladstone_dale = NAN, DISAGREE, "gladstone_dale");
+  BAD_PHOTO(b.reserved = 1, VALUE, "reserved");
+  BAD_PHOTO(b.volume = 1, VALUE, "volume");
+  BAD_PHOTO(b.values.count = 26, VALUE, "26 values for [3, 3, 3] points");
+  BAD_PHOTO(b.values.kind = RTSV_COMPOSITE_U8, VALUE, "give float, double");
+  BAD_PHOTO(b.values.data = NULL, VALUE, "null pointer");
+  BAD_PHOTO(b.slice_bytes = INT64_MIN, VALUE, "no memory is so large");
+  BAD_PHOTO(b.first[0] = UINT32_MAX, DISAGREE, "from node [4294967295, 0, 0]");
+  BAD_PHOTO(s.struct_bytes = 3, STRUCT, "Shot is 3");
+  BAD_PHOTO(s.technique = 9, VALUE, "technique");
+  BAD_PHOTO(s.interpolant = 9, VALUE, "interpolant");
+  BAD_PHOTO(s.threads = 9, VALUE, "threads");
+  BAD_PHOTO(s.timeout_secs = -1, VALUE, "timeout_secs");
+  BAD_PHOTO(s.root = 1, DISAGREE, "root is 1");
+  BAD_PHOTO(s.width = 0, DISAGREE, "0x4");
+  BAD_PHOTO(s.direction[2] = 0, DISAGREE, "direction of light");
+  BAD_PHOTO(s.step_voxels = 0, DISAGREE, "step_voxels");
+  BAD_PHOTO(s.pixel_m = -1, DISAGREE, "pixel_m");
+  BAD_PHOTO(s.open_fraction = 2, DISAGREE, "open_fraction");
+  BAD_PHOTO(s.slit_width_m = 0, DISAGREE, "slit_width_m");
+  BAD_PHOTO((s.technique = RTSV_COMPOSITE_SHADOWGRAPH, s.focus_m = NAN), DISAGREE, "focus_m");
+  EXPECT(rtsv_composite_photograph(NULL, &gas, &brick, &shot, &photo), POINTER, "group of ranks");
+  ++photographs;
+  RtsvCompositeComm* group = fresh();
+  EXPECT(rtsv_composite_photograph(group, &gas, NULL, &shot, &photo), DISAGREE, "no rank has");
+  FINE(rtsv_composite_photograph(group, &gas, &brick, &shot, &photo));
+  ++photographs;
+  for (int k = 0; k < 20; ++k) faults += grey[k] < 0.499f || grey[k] > 0.501f;
+  FINE(rtsv_composite_comm_free(group));
+  if (releases != photographs) expect_at(__LINE__, 0, 1, "each array is released once");
+}
+
 int main(void) {
   if (rtsv_composite_library_version() != RTSV_COMPOSITE_VERSION) ++faults;
   if (strcmp(rtsv_composite_last_error(), "") != 0) ++faults;
@@ -421,6 +494,7 @@ int main(void) {
   groups();
   images();
   scenes();
+  photographs();
   /* A release function may make calls, and even free the scene. */
   const float points[3] = {0};
   scene_in_call = other;

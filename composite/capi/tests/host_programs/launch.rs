@@ -12,15 +12,23 @@ pub(crate) struct Mpi {
     pub(crate) name: &'static str,
     launcher: &'static str,
     c: &'static str,
+    cpp: &'static str,
     fortran: &'static str,
 }
 
 pub(crate) const MPIS: [Mpi; 2] = [
-    Mpi { name: "openmpi", launcher: "RTSV_MPIRUN", c: "RTSV_MPICC", fortran: "RTSV_MPIFORT" },
+    Mpi {
+        name: "openmpi",
+        launcher: "RTSV_MPIRUN",
+        c: "RTSV_MPICC",
+        cpp: "RTSV_MPICXX",
+        fortran: "RTSV_MPIFORT",
+    },
     Mpi {
         name: "mpich",
         launcher: "RTSV_MPIRUN_MPICH",
         c: "RTSV_MPICC_MPICH",
+        cpp: "RTSV_MPICXX_MPICH",
         fortran: "RTSV_MPIFORT_MPICH",
     },
 ];
@@ -94,6 +102,16 @@ impl Mpi {
         let compiler = peer(self.c)?;
         let stem = Path::new(source).file_stem().expect("a file").to_string_lossy();
         let flags = ["-std=c11", "-pedantic", "-pthread"];
+        Some(compile(&compiler, &flags, &[source], &format!("{stem}-{}", self.name)))
+    }
+
+    /// The C++ program at `source`.
+    pub(crate) fn compile_cpp(&self, source: &str) -> Option<PathBuf> {
+        static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
+        let compiler = peer(self.cpp)?;
+        let _turn = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
+        let stem = Path::new(source).file_stem().expect("a file").to_string_lossy();
+        let flags = ["-std=c++17", "-pedantic"];
         Some(compile(&compiler, &flags, &[source], &format!("{stem}-{}", self.name)))
     }
 

@@ -9,3 +9,4 @@ mod expected;
 mod launch;
 mod misuse;
 mod ranks;
+mod simulations;

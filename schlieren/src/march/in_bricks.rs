@@ -1,0 +1,373 @@
+//! A march that processes share, each with a brick of the lattice: a ray stops where its next
+//! sample needs nodes of another brick, and goes on there from a state of 64 bytes.
+//!
+//! The march is that of [`super::Deviational`] in `f64`: a sample at the entry, position Verlet in
+//! steps of one length, and one step back into the exit plane. Every step takes one sample, at a
+//! place that follows from the state alone. So the cell of that sample says who takes the step,
+//! and the exit has the same bits however the lattice is cut, if the nodes have.
+//!
+//! The interpolants are those whose samples need the nodes around a cell and no others
+//! ([`Stencil`]). The prefilter of the cubic spline needs whole rows of the lattice, which no
+//! process has.
+
+use super::frame::{Frame, UndisturbedRay};
+use super::kernel_ray::steps_of;
+use crate::interpolate::{Interpolant, Sample, cell};
+use crate::path::{Exit, Start, Status};
+use crate::view::View;
+use glam::DVec3;
+
+/// A lattice that is cut into bricks: its nodes, without their values.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lattice {
+    /// Nodes along x, y and z.
+    pub dims: [usize; 3],
+    /// Distance of neighbouring nodes.
+    pub spacing_m: [f64; 3],
+    /// Position of the first node.
+    pub origin_m: DVec3,
+    /// Index of refraction of the reference medium outside.
+    pub n0: f64,
+}
+
+/// Why a march through bricks cannot be made.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum InBricksError {
+    /// Too few or too many nodes along an axis.
+    #[error("the lattice has {nodes} node(s) along {axis}: give 2 to 2147483647")]
+    Dims {
+        /// x, y or z.
+        axis: char,
+        /// Number of nodes given.
+        nodes: usize,
+    },
+    /// A spacing that is not a length.
+    #[error("spacing_m along {axis} is {spacing_m}: give a length above 0, in metres")]
+    Spacing {
+        /// x, y or z.
+        axis: char,
+        /// Spacing given.
+        spacing_m: f64,
+    },
+    /// An origin or an index that is not a number.
+    #[error("origin_m {origin_m} or n0 {n0} is no finite number, or n0 is not above 0")]
+    NotFinite {
+        /// Origin given.
+        origin_m: DVec3,
+        /// Index given.
+        n0: f64,
+    },
+    /// A step that no ray can take.
+    #[error("step_voxels is {0}: give 0.01 to 8")]
+    Step(f64),
+    /// The spline.
+    #[error(
+        "the cubic spline cannot be cut into bricks, because its prefilter needs whole rows of \
+         the lattice: use trilinear gradients, or trilinear interpolation"
+    )]
+    Spline,
+}
+
+/// The nodes that a sample needs besides the eight of its cell.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stencil {
+    /// None: trilinear interpolation and its exact gradient.
+    Cell,
+    /// One more layer on each side, where the lattice has one: trilinear interpolation of central
+    /// differences.
+    CellAndNeighbours,
+}
+
+impl Stencil {
+    /// Layers of nodes around a cell.
+    pub fn layers(self) -> usize {
+        match self {
+            Stencil::Cell => 0,
+            Stencil::CellAndNeighbours => 1,
+        }
+    }
+}
+
+/// The values that one process has.
+pub trait Brick: Sync {
+    /// The first cell in which it has all nodes that samples need, and the cell behind the last.
+    /// Cell i lies between the nodes i and i + 1.
+    fn cells(&self) -> [[usize; 3]; 2];
+
+    /// The value of eps at a node of the whole lattice, one that a sample in these cells needs.
+    /// Not finite where there is no gas.
+    fn eps(&self, node: [usize; 3]) -> f64;
+}
+
+/// A ray on its way: deviations from its undisturbed ray.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct RayState {
+    /// Samples taken so far.
+    pub samples: u32,
+    /// The value of eps at the entry.
+    pub eps_at_entry: f64,
+    /// Deviation of the position.
+    pub xi_m: DVec3,
+    /// Deviation of the rate dx/dtau.
+    pub u: DVec3,
+    /// Optical path difference, divided by n0.
+    pub path_m: f64,
+}
+
+/// How far a brick brought a ray.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Progress {
+    /// The next sample lies in this cell, which the brick does not have.
+    NeedsCell([usize; 3]),
+    /// The ray has left the lattice.
+    Left(Exit),
+}
+
+/// The march, without any values.
+#[derive(Debug, Clone)]
+pub struct InBricks {
+    frame: Frame,
+    dims: [usize; 3],
+    origin_m: DVec3,
+    n0: f64,
+    stencil: Stencil,
+    step_voxels: f64,
+}
+
+impl InBricks {
+    /// A march with steps of at most `step_voxels` through a lattice seen from `view`.
+    ///
+    /// # Errors
+    /// For a lattice, a step or an interpolant that cannot be.
+    pub fn new(
+        lattice: &Lattice,
+        view: View,
+        interpolant: Interpolant,
+        step_voxels: f64,
+    ) -> Result<InBricks, InBricksError> {
+        for (c, axis) in ['x', 'y', 'z'].into_iter().enumerate() {
+            let (nodes, spacing_m) = (lattice.dims[c], lattice.spacing_m[c]);
+            if !(2..=i32::MAX as usize).contains(&nodes) {
+                return Err(InBricksError::Dims { axis, nodes });
+            }
+            if !(1e-12..=1e12).contains(&spacing_m) {
+                return Err(InBricksError::Spacing { axis, spacing_m });
+            }
+        }
+        let (origin_m, n0) = (lattice.origin_m, lattice.n0);
+        if !origin_m.is_finite() || !n0.is_finite() || n0 <= 0.0 {
+            return Err(InBricksError::NotFinite { origin_m, n0 });
+        }
+        if !(0.01..=8.0).contains(&step_voxels) {
+            return Err(InBricksError::Step(step_voxels));
+        }
+        let stencil = match interpolant {
+            Interpolant::BSpline => return Err(InBricksError::Spline),
+            Interpolant::Trilinear => Stencil::Cell,
+            Interpolant::TrilinearGradient => Stencil::CellAndNeighbours,
+        };
+        let frame = Frame::of_lattice(lattice.dims, lattice.spacing_m, origin_m, view);
+        Ok(InBricks { frame, dims: lattice.dims, origin_m, n0, stencil, step_voxels })
+    }
+
+    /// The nodes that samples need.
+    pub fn stencil(&self) -> Stencil {
+        self.stencil
+    }
+
+    /// The view in whose frame starts and exits are given.
+    pub fn view(&self) -> &View {
+        &self.frame.view
+    }
+
+    /// The position of a point in lattice coordinates.
+    pub fn position_m(&self, at: DVec3) -> DVec3 {
+        self.origin_m + at * self.frame.spacing_m
+    }
+
+    /// Cells of the whole lattice along each axis.
+    pub fn cells(&self) -> [usize; 3] {
+        self.dims.map(|nodes| nodes - 1)
+    }
+
+    /// The cells in which a box of nodes, from `first` to before `end`, has all that samples need:
+    /// the first cell, and the cell behind the last.
+    pub fn cells_of_nodes(&self, first: [usize; 3], end: [usize; 3]) -> [[usize; 3]; 2] {
+        let (layers, whole) = (self.stencil.layers(), self.cells());
+        let low = |c: usize| if first[c] == 0 { 0 } else { first[c].saturating_add(layers) };
+        let high = |c: usize| {
+            let missing = if end[c] >= self.dims[c] { 1 } else { 1 + layers };
+            end[c].min(self.dims[c]).saturating_sub(missing).min(whole[c])
+        };
+        [[0, 1, 2].map(low), [0, 1, 2].map(high)]
+    }
+
+    /// The cell in which the ray takes its first sample; `None` for a ray beside the lattice.
+    pub fn entry_cell(&self, start: &Start) -> Option<[usize; 3]> {
+        let ray = self.frame.undisturbed(start, &mut None);
+        (self.samples(&ray) > 0).then(|| self.cell_at(ray.at + ray.direction * ray.range_m[0]))
+    }
+
+    /// Distance along the undisturbed ray, from the centre plane, to where it leaves the lattice.
+    pub fn exit_depth_m(&self, start: &Start) -> f64 {
+        self.frame.undisturbed(start, &mut None).range_m[1]
+    }
+
+    /// The most samples that any ray takes.
+    pub fn most_samples(&self) -> u32 {
+        let diagonal = DVec3::from(self.cells().map(|n| n as f64)).length();
+        steps_of(diagonal / self.step_voxels).saturating_add(4)
+    }
+
+    /// Whether a state can be that of a ray from `start`.
+    pub fn is_possible(&self, start: &Start, state: &RayState) -> bool {
+        state.samples < self.samples(&self.frame.undisturbed(start, &mut None))
+    }
+
+    /// Samples that a ray takes: at its entry, in each step, and in the step into the exit plane;
+    /// none beside the lattice.
+    fn samples(&self, ray: &UndisturbedRay) -> u32 {
+        let length_m = ray.range_m[1] - ray.range_m[0];
+        if length_m <= 0.0 {
+            return 0;
+        }
+        let voxels = (ray.direction * length_m).length();
+        steps_of(voxels / self.step_voxels).max(1).saturating_add(2)
+    }
+
+    fn cell_at(&self, at: DVec3) -> [usize; 3] {
+        [0, 1, 2].map(|c| cell(at[c], self.dims[c]).0)
+    }
+
+    /// Moves a ray as far as `brick` has the nodes.
+    pub fn advance(&self, start: &Start, state: &mut RayState, brick: &impl Brick) -> Progress {
+        let ray = self.frame.undisturbed(start, &mut None);
+        let all = self.samples(&ray);
+        if all == 0 {
+            return Progress::Left(self.exit(&ray, state, Status::Free));
+        }
+        let [low, high] = brick.cells();
+        let direction = ray.beam[2];
+        let steps = all - 2;
+        let step_m = (ray.range_m[1] - ray.range_m[0]) / f64::from(steps);
+        while state.samples < all {
+            // ---- Where the sample is: `depth_m` along the undisturbed ray, `xi_m` beside it.
+            let rate = 1.0 + state.eps_at_entry;
+            let (depth_m, dtau_m) = match state.samples {
+                0 => (0.0, 0.0),
+                k if k <= steps => ((f64::from(k) - 0.5) * step_m, step_m / rate),
+                _ => {
+                    // tau is not depth: a ray that has gained depth goes back to its exit plane.
+                    let forward = rate + state.u.dot(direction);
+                    if forward.is_nan() || forward <= 0.0 {
+                        return Progress::Left(self.exit(&ray, state, Status::Turned));
+                    }
+                    let dtau_m = -state.xi_m.dot(direction) / forward;
+                    (f64::from(steps) * step_m + 0.5 * dtau_m * rate, dtau_m)
+                }
+            };
+            let xi_m = state.xi_m + state.u * (0.5 * dtau_m);
+            let straight = ray.at + ray.direction * (ray.range_m[0] + depth_m);
+            let at = straight + xi_m / self.frame.spacing_m;
+            let here = self.cell_at(at);
+            if (0..3).any(|c| here[c] < low[c] || here[c] >= high[c]) {
+                return Progress::NeedsCell(here);
+            }
+            // ---- What the sample does.
+            let sample = self.sample(at, brick);
+            let gradient = DVec3::from(sample.gradient) / self.frame.spacing_m;
+            if !sample.eps.is_finite() || !gradient.is_finite() {
+                return Progress::Left(self.exit(&ray, state, Status::Masked));
+            }
+            if state.samples == 0 {
+                state.eps_at_entry = sample.eps;
+            } else {
+                let push = gradient * ((1.0 + sample.eps) * dtau_m);
+                let middle = state.u + push * 0.5;
+                let across = middle - direction * middle.dot(direction);
+                // (1+eps)² - w_z = eps (1+eps) + u_t² / (1+eps+w_z): no difference of large numbers.
+                let n = 1.0 + sample.eps;
+                let w_z = (n * n - across.length_squared()).max(0.0).sqrt();
+                state.path_m += (sample.eps * n + across.length_squared() / (n + w_z)) * dtau_m;
+                state.u += push;
+                state.xi_m = xi_m + state.u * (0.5 * dtau_m);
+            }
+            state.samples += 1;
+        }
+        Progress::Left(self.exit(&ray, state, Status::Free))
+    }
+
+    fn exit(&self, ray: &UndisturbedRay, state: &RayState, status: Status) -> Exit {
+        let [right, up, _] = ray.beam;
+        let across = |v: DVec3| [v.dot(right) as f32, v.dot(up) as f32];
+        Exit {
+            deflection_rad: across(state.u),
+            displacement_m: across(state.xi_m),
+            exit_depth_m: ray.range_m[1] as f32,
+            opd_m: (state.path_m * self.n0) as f32,
+            transmission: if status == Status::Masked { 0.0 } else { 1.0 },
+            status,
+        }
+    }
+
+    /// A sample of `brick`: a sum over the 4 x 4 x 4 nodes around the cell with weights of value
+    /// and derivative for each axis. Eight nodes of these, or 32, have any weight.
+    fn sample(&self, at: DVec3, brick: &impl Brick) -> Sample {
+        let wide = self.stencil == Stencil::CellAndNeighbours;
+        let axes: [Weights; 3] = [0, 1, 2].map(|c| Weights::new(at[c], self.dims[c], wide));
+        let [x, y, z] = &axes;
+        let (mut eps, mut gradient) = (0.0, [0.0; 3]);
+        for k in 0..4 {
+            for j in 0..4 {
+                let (inner_k, inner_j) = (k == 1 || k == 2, j == 1 || j == 2);
+                if !(inner_k && inner_j || wide && (inner_k || inner_j)) {
+                    continue;
+                }
+                let node = |i: usize| brick.eps([x.nodes[i], y.nodes[j], z.nodes[k]]);
+                let (b, c) = (node(1), node(2));
+                let value = x.value[1] * b + x.value[2] * c;
+                if inner_k && inner_j {
+                    let mut slope = x.slope[1] * b + x.slope[2] * c;
+                    if wide {
+                        slope += x.slope[0] * node(0) + x.slope[3] * node(3);
+                    }
+                    gradient[0] += slope * (y.value[j] * z.value[k]);
+                    eps += value * (y.value[j] * z.value[k]);
+                }
+                gradient[1] += value * (y.slope[j] * z.value[k]);
+                gradient[2] += value * (y.value[j] * z.slope[k]);
+            }
+        }
+        Sample { eps, gradient }
+    }
+}
+
+/// Nodes around a cell along one axis, from the one before it, with their weights.
+struct Weights {
+    nodes: [usize; 4],
+    value: [f64; 4],
+    slope: [f64; 4],
+}
+
+impl Weights {
+    fn new(at: f64, nodes: usize, wide: bool) -> Weights {
+        let (i, x) = cell(at, nodes);
+        // The differences at both nodes of the cell: central ones, of second order at the faces.
+        let (below, above) = match (wide, i == 0, i + 2 == nodes) {
+            (false, ..) | (_, true, true) => ([0.0, -1.0, 1.0, 0.0], [0.0, -1.0, 1.0, 0.0]),
+            (_, true, false) => ([0.0, -1.5, 2.0, -0.5], [0.0, -0.5, 0.0, 0.5]),
+            (_, false, true) => ([-0.5, 0.0, 0.5, 0.0], [0.5, -2.0, 1.5, 0.0]),
+            (_, false, false) => ([-0.5, 0.0, 0.5, 0.0], [0.0, -0.5, 0.0, 0.5]),
+        };
+        Weights {
+            // A node that is not there has no weight; the nearest one is read in its place.
+            nodes: [0, 1, 2, 3].map(|k: usize| (i + k).saturating_sub(1).min(nodes - 1)),
+            value: [0.0, 1.0 - x, x, 0.0],
+            slope: [0, 1, 2, 3].map(|k| (1.0 - x) * below[k] + x * above[k]),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,194 @@
+use super::*;
+use crate::field::Field;
+use crate::march::{Deviational, Options};
+use crate::path::{LightPaths, PathQuantities};
+use crate::view::Axis;
+
+const DIMS: [usize; 3] = [19, 14, 23];
+const SPACING_M: [f64; 3] = [1e-3, 1.5e-3, 0.8e-3];
+const N0: f64 = 1.000_27;
+
+/// Two warm spots whose light crosses the cuts of all bricks obliquely.
+fn gas(p: DVec3) -> f64 {
+    let spot =
+        |at: DVec3, sigma_m: f64| (-(p - at).length_squared() / (2.0 * sigma_m.powi(2))).exp();
+    let spots = spot(DVec3::new(7e-3, 9e-3, 8e-3), 3e-3) - 0.7 * spot(DVec3::splat(11e-3), 4e-3);
+    2e-4 * spots + 1e-5 * p.x / 1e-2
+}
+
+fn field() -> Field {
+    Field::from_fn(DIMS, SPACING_M, DVec3::ZERO, N0, gas).expect("a field")
+}
+
+fn lattice() -> Lattice {
+    Lattice { dims: DIMS, spacing_m: SPACING_M, origin_m: DVec3::ZERO, n0: N0 }
+}
+
+fn views() -> [View; 3] {
+    let centre_m = field().centre_m();
+    let oblique = View::new(DVec3::new(0.6, -0.8, 0.5), DVec3::Z, centre_m).expect("a view");
+    [View::along(Axis::Z, centre_m), View::along(Axis::Y, centre_m), oblique]
+}
+
+fn starts() -> Vec<Start> {
+    // Not on faces of cells, where trilinear gradients jump.
+    let at = |i: i32| (i as f32 - 6.0) * 1.9e-3 + 0.37e-4;
+    let start = |i, j| Start { position_m: [at(i), at(j)], tilt_rad: [0.0; 2] };
+    (0..13).flat_map(|j| (0..13).map(move |i| start(i, j))).collect()
+}
+
+/// Nodes `first` to before `end` of the field; a read beside them panics.
+struct Part<'a> {
+    field: &'a Field,
+    nodes: [[usize; 3]; 2],
+    cells: [[usize; 3]; 2],
+}
+
+impl Brick for Part<'_> {
+    fn cells(&self) -> [[usize; 3]; 2] {
+        self.cells
+    }
+
+    fn eps(&self, node: [usize; 3]) -> f64 {
+        let [first, end] = self.nodes;
+        assert!((0..3).all(|c| (first[c]..end[c]).contains(&node[c])), "{node:?} is not here");
+        f64::from(self.field.eps()[(node[2] * DIMS[1] + node[1]) * DIMS[0] + node[0]])
+    }
+}
+
+fn part<'a>(march: &InBricks, field: &'a Field, nodes: [[usize; 3]; 2]) -> Part<'a> {
+    Part { field, nodes, cells: march.cells_of_nodes(nodes[0], nodes[1]) }
+}
+
+/// Exits by bricks with cuts at `cuts` and as many layers of ghosts as the stencil has, and how
+/// often rays changed bricks.
+fn traced(march: &InBricks, field: &Field, cuts: &[usize]) -> (Vec<Exit>, usize) {
+    let layers = march.stencil().layers();
+    let along = |c: usize| -> Vec<[usize; 2]> {
+        let last = DIMS[c] - 1;
+        let mut ends: Vec<usize> = [0].into_iter().chain(cuts.iter().copied()).collect();
+        ends.retain(|cut| *cut < last);
+        ends.push(last);
+        let range = |w: &[usize]| [w[0].saturating_sub(layers), (w[1] + layers).min(last) + 1];
+        ends.windows(2).map(range).collect()
+    };
+    let mut parts = Vec::new();
+    for z in along(2) {
+        for y in along(1) {
+            for x in along(0) {
+                parts.push(part(march, field, [[x[0], y[0], z[0]], [x[1], y[1], z[1]]]));
+            }
+        }
+    }
+    let mut changes = 0;
+    let exit = |start: &Start| {
+        let mut state = RayState::default();
+        let mut here = march.entry_cell(start).unwrap_or_default();
+        loop {
+            let has =
+                |p: &&Part<'_>| (0..3).all(|c| (p.cells[0][c]..p.cells[1][c]).contains(&here[c]));
+            let part = parts.iter().find(has).expect("every cell is in a brick");
+            match march.advance(start, &mut state, part) {
+                Progress::Left(exit) => return exit,
+                Progress::NeedsCell(cell) => here = cell,
+            }
+            changes += 1;
+        }
+    };
+    (starts().iter().map(exit).collect(), changes)
+}
+
+#[test]
+fn a_lattice_in_bricks_has_the_bits_of_the_lattice_in_one_piece() {
+    let field = field();
+    for interpolant in [Interpolant::Trilinear, Interpolant::TrilinearGradient] {
+        for view in views() {
+            let march = InBricks::new(&lattice(), view, interpolant, 0.7).expect("a march");
+            let (whole, changes) = traced(&march, &field, &[]);
+            assert_eq!(changes, 0);
+            for cuts in [&[9][..], &[4, 8, 12, 16], &[1, 2, 3, 7, 11]] {
+                let (exits, changes) = traced(&march, &field, cuts);
+                assert!(changes > 50, "{changes}");
+                assert!(exits == whole, "{interpolant:?}, cut at {cuts:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn exits_are_those_of_the_march_of_one_process() {
+    let field = field();
+    for interpolant in [Interpolant::Trilinear, Interpolant::TrilinearGradient] {
+        for view in views() {
+            let march = InBricks::new(&lattice(), view, interpolant, 1.0).expect("a march");
+            let (exits, _) = traced(&march, &field, &[9]);
+            let quantities = PathQuantities { opd: true };
+            let options = Options { quantities, ..Options::default() };
+            let paths = Deviational::new(&field, view, interpolant, options);
+            let mut expected = vec![Exit::UNDISTURBED; exits.len()];
+            paths.trace(&starts(), &mut expected);
+            let mut largest = [0.0_f32; 3];
+            for (a, b) in exits.iter().zip(&expected) {
+                let all = |e: &Exit| [e.deflection_rad[0], e.deflection_rad[1], e.opd_m];
+                for (k, (a, b)) in all(a).into_iter().zip(all(b)).enumerate() {
+                    // Those sum in f32, with gradients of 24 bits: 1e-6 of the largest values here.
+                    let tolerance = [4e-9, 4e-9, 4e-12][k];
+                    assert!((a - b).abs() < tolerance, "{interpolant:?} {k}: {a} {b}");
+                    largest[k] = largest[k].max(b.abs());
+                }
+                let moved = (a.displacement_m[0] - b.displacement_m[0]).abs();
+                assert!(moved < 1e-10 && a.exit_depth_m == b.exit_depth_m, "{moved}");
+            }
+            assert!(largest[0] > 1e-4 && largest[2] > 2e-7, "there is light to bend: {largest:?}");
+        }
+    }
+}
+
+#[test]
+fn light_ends_where_there_is_no_gas_and_goes_on_beside_it() {
+    let mut eps = field().eps().to_vec();
+    eps[(11 * DIMS[1] + 7) * DIMS[0] + 9] = f32::NAN;
+    struct Holed(Vec<f32>);
+    impl Brick for Holed {
+        fn cells(&self) -> [[usize; 3]; 2] {
+            [[0; 3], DIMS.map(|n| n - 1)]
+        }
+        fn eps(&self, [i, j, k]: [usize; 3]) -> f64 {
+            f64::from(self.0[(k * DIMS[1] + j) * DIMS[0] + i])
+        }
+    }
+    let view = views()[0];
+    let march = InBricks::new(&lattice(), view, Interpolant::Trilinear, 1.0).expect("a march");
+    let holed = Holed(eps);
+    let outcome = |x: f32| {
+        let start = Start { position_m: [x, 0.0], tilt_rad: [0.0; 2] };
+        march.advance(&start, &mut RayState::default(), &holed)
+    };
+    let Progress::Left(exit) = outcome(2e-4) else { panic!("it has all cells") };
+    assert_eq!((exit.status, exit.transmission), (Status::Masked, 0.0));
+    let Progress::Left(exit) = outcome(5e-3) else { panic!("it has all cells") };
+    assert_eq!((exit.status, exit.transmission), (Status::Free, 1.0));
+}
+
+#[test]
+fn what_cannot_be_marched_through_is_refused_by_name() {
+    let view = views()[0];
+    let refused = |lattice: Lattice, interpolant, step| {
+        InBricks::new(&lattice, view, interpolant, step).expect_err("refused").to_string()
+    };
+    let linear = Interpolant::Trilinear;
+    let whole = lattice();
+    assert!(refused(whole, Interpolant::BSpline, 1.0).contains("spline"));
+    for step in [0.0, -1.0, f64::NAN, 9.0] {
+        assert!(refused(whole, linear, step).contains("step_voxels"));
+    }
+    let thin = Lattice { dims: [4, 1, 4], ..whole };
+    assert!(refused(thin, linear, 1.0).contains("1 node(s) along y"));
+    let flat = Lattice { spacing_m: [1.0, 1.0, f64::NAN], ..whole };
+    assert!(refused(flat, linear, 1.0).contains("along z"));
+    assert!(refused(Lattice { n0: f64::INFINITY, ..whole }, linear, 1.0).contains("n0"));
+    let march = InBricks::new(&whole, view, linear, 1.0).expect("a march");
+    let state = RayState { samples: march.most_samples(), ..RayState::default() };
+    assert!(!march.is_possible(&Start::default(), &state));
+    assert!(march.is_possible(&Start::default(), &RayState::default()));
+}
