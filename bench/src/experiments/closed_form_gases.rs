@@ -113,8 +113,16 @@ pub(super) fn deflections(eps: Formula, view: &View, starts: &[Start]) -> Vec<Op
         let [x, y] = start.position_m.map(f64::from);
         let at = view.centre_m + view.right * x + view.up * y;
         let (near, far) = crossing(at, view.forward)?;
-        let ray = Ray::inside(&medium, at + near * view.forward, view.forward);
-        let u = march.run(&medium, &ray, far - near)?.ray.u;
+        let length = far - near;
+        let mut ray = Ray::inside(&medium, at + near * view.forward, view.forward);
+        // In tau, the plane where the undisturbed ray leaves is nearer or farther by eps. The last
+        // part begins where that is known, and a straight step puts right what is left: its square
+        // times the second derivative, which is below 1e-12.
+        let to_plane = |ray: &Ray| (length - ray.depth_m()) / ray.w().dot(view.forward);
+        ray = march.run(&medium, &ray, 0.95 * length)?.ray;
+        ray = march.run(&medium, &ray, to_plane(&ray))?.ray;
+        let (eps, gradient) = medium.sample(ray.position_m());
+        let u = ray.u + to_plane(&ray) * (1.0 + eps) * gradient;
         Some([u.dot(view.right), u.dot(view.up)])
     };
     starts.par_iter().map(one).collect()
