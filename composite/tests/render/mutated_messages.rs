@@ -111,7 +111,7 @@ fn messages_of_the_renderer_with_random_changes_end_in_the_image_or_in_named_err
                     errors += 1;
                     let text = error.to_string();
                     assert!(text.contains("rank"), "{case}: {text}");
-                    // Who announces with a right checksum what it does not send is found by waiting.
+                    // Who announces, with a right checksum, what never comes is found by waiting.
                     let timeout = matches!(error, FrameError::Comm(CommError::Timeout { .. }));
                     assert!(!timeout || is_consistent, "{case}: {text}");
                     waited += usize::from(timeout);

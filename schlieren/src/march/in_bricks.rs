@@ -286,7 +286,7 @@ impl InBricks {
                 let push = gradient * ((1.0 + sample.eps) * dtau_m);
                 let middle = state.u + push * 0.5;
                 let across = middle - direction * middle.dot(direction);
-                // (1+eps)² - w_z = eps (1+eps) + u_t² / (1+eps+w_z): no difference of large numbers.
+                // (1+eps)² - w_z = eps (1+eps) + u_t² / (1+eps+w_z), without cancellation.
                 let n = 1.0 + sample.eps;
                 let w_z = (n * n - across.length_squared()).max(0.0).sqrt();
                 state.path_m += (sample.eps * n + across.length_squared() / (n + w_z)) * dtau_m;
