@@ -9,6 +9,7 @@ pub mod csv;
 pub mod csv_lattice;
 pub mod error;
 pub mod gltf;
+pub(crate) mod hdf5;
 pub mod mhd;
 pub mod npy;
 pub mod nrrd;
