@@ -1,5 +1,6 @@
 """Writes the small files that the tests read, with h5py, netCDF4 and VTK. Run it in this folder."""
 import h5py
+import netCDF4
 import numpy as np
 
 
@@ -58,6 +59,60 @@ def hdf5(name, libver):
         f["elsewhere"] = h5py.ExternalLink("other.h5", "/x")
 
 
+def image(name, times):
+    """Image data of VTKHDF; with times, the point data grow and the cell data stay."""
+    with h5py.File(name, "w") as f:
+        g = f.create_group("VTKHDF")
+        g.attrs["Version"] = [2, 0]
+        g.attrs.create("Type", b"ImageData", dtype=h5py.string_dtype("ascii", 9))
+        g.attrs["WholeExtent"] = [0, 3, 1, 3, 0, 1]
+        g.attrs["Origin"], g.attrs["Spacing"] = [1.0, -2.0, 0.5], [0.5, 1.0, 2.0]
+        g.attrs["Direction"] = np.eye(3).ravel()
+        p, c = g.create_group("PointData"), g.create_group("CellData")
+        rho = counted((2, 3, 4), "f4")
+        if times:
+            rho = np.stack([rho + 100 * i for i in range(len(times))])
+            s = g.create_group("Steps")
+            s.attrs["NSteps"] = len(times)
+            s["Values"] = np.array(times)
+            s["PointDataOffsets/rho"] = np.arange(len(times))
+            s["CellDataOffsets/c"] = np.zeros(len(times), "i8")
+        p["rho"] = rho
+        p["rho"].attrs["Attribute"] = np.bytes_("Scalars")
+        c["c"] = counted((1, 1, 2, 3, 2), "u1") if times else counted((1, 2, 3, 2), "u1")
+        g["FieldData/gamma"] = np.array([1.4])
+
+
+def netcdf(name, form):
+    """Two times on 4 x 3 x 2 points: packed temperatures in degrees C, and densities."""
+    with netCDF4.Dataset(name, "w", format=form) as f:
+        f.createDimension("time", None)
+        for axis, x in dict(x=[1, 2, 3, 4], y=[0, 10, 20], z=[0, 5]).items():
+            f.createDimension(axis, len(x))
+            v = f.createVariable(axis, "f4", (axis,))
+            v.units, v[:] = "mm", x
+        t = f.createVariable("time", "f8", ("time",))
+        t.units, t[:] = "seconds since 2020-01-01", [0.25, 0.5]
+        v = f.createVariable("T", "i2", ("time", "z", "y", "x"), fill_value=-999)
+        v.set_auto_maskandscale(False)
+        v.scale_factor, v.add_offset, v.units = 0.5, 20.0, "degC"
+        v[0] = counted((2, 3, 4), "i2")
+        v[1] = counted((2, 3, 4), "i2") + 100
+        v[1, 0, 0, 2] = -999
+        v = f.createVariable("rho", "f8", ("time", "z", "y", "x"))
+        v[0], v[1] = counted((2, 3, 4)), counted((2, 3, 4)) + 100
+        v = f.createVariable("static", "f4", ("x", "y", "z"))
+        v[:] = counted((4, 3, 2))
+        v = f.createVariable("line", "f4", ("x",))
+        v[:] = 1
+
+
 if __name__ == "__main__":
+    image("image.vtkhdf", [])
+    image("times.vtkhdf", [0.0, 0.5, 2.0])
+    netcdf("classic.nc", "NETCDF3_CLASSIC")
+    netcdf("offset.nc", "NETCDF3_64BIT_OFFSET")
+    netcdf("data.nc", "NETCDF3_64BIT_DATA")
+    netcdf("netcdf4.nc", "NETCDF4")
     hdf5("old.h5", "earliest")
     hdf5("new.h5", "latest")

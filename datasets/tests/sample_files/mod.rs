@@ -426,6 +426,11 @@ pub(crate) fn all() -> Vec<Sample> {
         ("a.obj", OBJ.into()),
         ("a.gltf", gltf()),
         ("a.glb", glb()),
+        ("a.vtkhdf", include_bytes!("../files/image.vtkhdf").to_vec()),
+        ("b.vtkhdf", include_bytes!("../files/times.vtkhdf").to_vec()),
+        ("a.nc", include_bytes!("../files/classic.nc").to_vec()),
+        ("b.nc", include_bytes!("../files/data.nc").to_vec()),
+        ("c.nc", include_bytes!("../files/netcdf4.nc").to_vec()),
     ]);
     for (name, records, big) in [("a.xyz", false, true), ("b.xyz", true, false)] {
         list.push((name, plot3d(&[[3, 2, 2], [2, 2, 2]], true, records, big, true).0));

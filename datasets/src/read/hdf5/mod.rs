@@ -130,11 +130,6 @@ impl Hdf5File {
         let messages = header::messages(&self.source, address).map_err(|f| at_object(f, &path))?;
         Ok(Object { file: self, path, address, messages })
     }
-
-    /// The object with this path, if it exists.
-    pub(crate) fn find(&self, path: &str) -> Result<Option<Object<'_>>, Fault> {
-        self.root()?.find(path)
-    }
 }
 
 /// Adds the object to the place of a fault.
@@ -287,6 +282,11 @@ impl<'f> Object<'f> {
     /// Lengths of the axes of a dataset.
     pub(crate) fn shape(&self) -> Result<Vec<u64>, Fault> {
         Ok(self.stored()?.space.dims)
+    }
+
+    /// Whether the values of a dataset are numbers.
+    pub(crate) fn is_number(&self) -> Result<bool, Fault> {
+        Ok(matches!(self.stored()?.datatype.kind, datatype::Kind::Number(..)))
     }
 
     /// Whether the first axis of a dataset can grow.

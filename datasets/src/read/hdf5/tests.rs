@@ -35,7 +35,7 @@ fn boxes_of_chunks_and_of_contiguous_values() {
     for name in FILES {
         let file = open(name);
         for path in ["chunked", "contiguous", "filtered"] {
-            let d = file.find(path).unwrap().unwrap();
+            let d = file.root().unwrap().find(path).unwrap().unwrap();
             let [rows, columns] = d.shape().unwrap()[..] else { panic!("{path}") };
             for (start, count) in
                 [([0, 0], [rows, columns]), ([1, 2], [2, 3]), ([rows - 1, 0], [1, columns])]
@@ -57,7 +57,7 @@ fn groups_links_attributes_and_texts() {
     for name in FILES {
         let file = open(name);
         for count in [3, 20] {
-            let group = file.find(&format!("group of {count}")).unwrap().unwrap();
+            let group = file.root().unwrap().find(&format!("group of {count}")).unwrap().unwrap();
             assert_eq!(group.names().unwrap().len(), count, "{name}");
             assert_eq!(group.attributes().unwrap().len(), count, "{name}");
             let last = count - 1;
@@ -65,17 +65,17 @@ fn groups_links_attributes_and_texts() {
             assert_eq!(value, [last as f64, 0.5]);
             check(&group.get(&format!("member {last}")).unwrap());
         }
-        let texts = file.find("group of 3").unwrap().unwrap();
-        check(&file.find("soft/member 1").unwrap().unwrap());
-        assert_eq!(file.find("soft/no such").unwrap().map(|o| o.path), None);
+        let texts = file.root().unwrap().find("group of 3").unwrap().unwrap();
+        check(&file.root().unwrap().find("soft/member 1").unwrap().unwrap());
+        assert_eq!(file.root().unwrap().find("soft/no such").unwrap().map(|o| o.path), None);
         let error = texts.get("no such").unwrap_err();
         assert!(error.what.contains("`member 0`"), "{error:?}");
-        let t = file.find("texts").unwrap().unwrap();
+        let t = file.root().unwrap().find("texts").unwrap().unwrap();
         assert_eq!(t.text("fixed").unwrap().as_deref(), Some("m/s"));
         assert_eq!(t.text("variable").unwrap().as_deref(), Some("ümlaut"));
         let Some(Data::Texts(list)) = t.attribute("list").unwrap() else { panic!() };
         assert_eq!(list, ["a", "", "bc"]);
-        let external = file.find("elsewhere/x").unwrap_err();
+        let external = file.root().unwrap().find("elsewhere/x").unwrap_err();
         assert!(external.what.contains("other.h5"), "{external:?}");
     }
 }
@@ -83,7 +83,7 @@ fn groups_links_attributes_and_texts() {
 #[test]
 fn what_is_not_read_is_refused_by_name() {
     let file = open("new.h5");
-    let refused = file.find("refused").unwrap().unwrap();
+    let refused = file.root().unwrap().find("refused").unwrap().unwrap();
     for (name, word) in
         [("lzf", "lzf"), ("compound", "compound"), ("virtual", "virtual"), ("half", "floats")]
     {
