@@ -3,14 +3,14 @@
 use super::error::{Fault, io_error, read_bytes};
 use super::{
     LoadedFile, OpenOptions, ReadError, gltf, hdf5, mhd, netcdf, npy, nrrd, obj, openfoam, plot3d,
-    ply, raw, stl, time_axis, vtk_legacy, vtk_xml, vtkhdf,
+    ply, raw, stl, time_axis, vtk_legacy, vtk_xml, vtkhdf, xdmf,
 };
 use std::io::Read;
 use std::path::Path;
 
 /// The supported formats, for messages.
 pub const KNOWN: &str = "VTK XML (.vti .vtp .vtu .vtr .vts, their parallel forms, .pvd, .vtm, .series), VTK \
-                         legacy (.vtk), VTKHDF (.vtkhdf), NetCDF (.nc), \
+                         legacy (.vtk), VTKHDF (.vtkhdf), NetCDF (.nc), XDMF (.xdmf .xmf), \
                          PLOT3D (.xyz .x .g .q .bin), NRRD (.nrrd .nhdr), MetaImage (.mhd .mha), \
                          raw with TOML (.raw), NumPy (.npy .npz), OpenFOAM cases (folders, .foam), OBJ, glTF, PLY, STL";
 
@@ -24,6 +24,7 @@ enum Format {
     VtkLegacy,
     VtkHdf,
     NetCdf,
+    Xdmf,
     Plot3d,
     Nrrd,
     MetaImage,
@@ -44,6 +45,7 @@ impl Format {
             Format::VtkLegacy => vtk_legacy::FORMAT,
             Format::VtkHdf => vtkhdf::FORMAT,
             Format::NetCdf => netcdf::FORMAT,
+            Format::Xdmf => xdmf::FORMAT,
             Format::Plot3d => plot3d::FORMAT,
             Format::Nrrd => nrrd::FORMAT,
             Format::MetaImage => mhd::FORMAT,
@@ -114,7 +116,7 @@ pub fn open_with(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Loaded
     }
     let has_times = [Format::VtkXml, Format::VtkSeries, Format::Numpy, Format::VtkHdf]
         .contains(&format)
-        || format == Format::NetCdf;
+        || [Format::NetCdf, Format::Xdmf].contains(&format);
     if !has_times {
         options.refuse_time().map_err(|f| f.in_file(path, format.name()))?;
     }
@@ -124,6 +126,7 @@ pub fn open_with(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Loaded
         Format::VtkLegacy => vtk_legacy::read(path),
         Format::VtkHdf => vtkhdf::read(path, options),
         Format::NetCdf => netcdf::read(path, options),
+        Format::Xdmf => xdmf::read(path, options),
         Format::Plot3d => plot3d::read(path, &plot3d::Plot3dOptions::default()),
         Format::Nrrd => nrrd::read(path),
         Format::MetaImage => mhd::read(path),
@@ -149,6 +152,8 @@ fn from_content(head: &[u8], length: u64) -> Option<Format> {
         Some(Format::VtkLegacy)
     } else if text.starts_with(b"<") && contains(b"<VTKFile") {
         Some(Format::VtkXml)
+    } else if text.starts_with(b"<") && (contains(b"<Xdmf") || contains(b"<xdmf")) {
+        Some(Format::Xdmf)
     } else if text.starts_with(b"{") && contains(b"\"file-series-version\"") {
         Some(Format::VtkSeries)
     } else if head.starts_with(b"CDF") && head.get(3).is_some_and(|v| [1, 2, 5].contains(v)) {
@@ -201,6 +206,7 @@ fn from_name(path: &Path) -> Option<Format> {
         | "pvd" | "vtm" => Format::VtkXml,
         "series" => Format::VtkSeries,
         "vtk" => Format::VtkLegacy,
+        "xdmf" | "xmf" | "xdmf2" | "xdmf3" => Format::Xdmf,
         "vtkhdf" => Format::VtkHdf,
         "nc" | "nc4" | "cdf" => Format::NetCdf,
         "xyz" | "x" | "g" | "grid" | "p3d" | "q" | "sol" => Format::Plot3d,
