@@ -189,3 +189,149 @@ fn what_vtk_writes_as_vtkhdf_is_what_it_writes_as_xml() {
     let last = open(&opened.time_steps[steps.len() - 1].path).unwrap_or_else(|e| panic!("{e}"));
     assert_same(last.dataset().unwrap(), &read("time1.vtu"), "the last time");
 }
+
+const WRITE_OTHERS: &str = r"
+import sys, vtk
+folder = sys.argv[1]
+wave = vtk.vtkRTAnalyticSource(); wave.SetWholeExtent(-1, 2, 0, 3, 0, 4); wave.Update()
+grid = vtk.vtkAppendFilter(); grid.AddInputData(wave.GetOutput()); grid.Update()
+rect = vtk.vtkRectilinearGrid(); rect.SetDimensions(3, 2, 2)
+for name, values in (('X', [0, 1, 4]), ('Y', [0, 2]), ('Z', [1, 3])):
+    a = vtk.vtkDoubleArray()
+    for v in values: a.InsertNextValue(v)
+    getattr(rect, f'Set{name}Coordinates')(a)
+c = vtk.vtkDoubleArray(); c.SetName('p')
+for i in range(12): c.InsertNextValue(i)
+rect.GetPointData().AddArray(c)
+curved = vtk.vtkStructuredGrid(); curved.SetDimensions(3, 2, 2)
+points = vtk.vtkPoints(); points.SetDataTypeToDouble()
+for i in range(12): points.InsertNextPoint(rect.GetPoint(i))
+curved.SetPoints(points); curved.GetPointData().AddArray(c)
+for name, data, writer in (('image', wave.GetOutput(), vtk.vtkXMLImageDataWriter()),
+                           ('grid', grid.GetOutput(), vtk.vtkXMLUnstructuredGridWriter()),
+                           ('rect', rect, vtk.vtkXMLRectilinearGridWriter()),
+                           ('curved', curved, vtk.vtkXMLStructuredGridWriter())):
+    x = vtk.vtkXdmfWriter(); x.SetInputDataObject(data); x.SetFileName(f'{folder}/{name}.xmf')
+    x.SetLightDataLimit(0 if name == 'grid' else 100000); x.Write()
+    writer.SetInputDataObject(data); writer.SetFileName(f'{folder}/{name}.ref'); writer.Write()
+tetra = vtk.vtkDataSetTriangleFilter(); tetra.SetInputData(grid.GetOutput()); tetra.Update()
+c = vtk.vtkDoubleArray(); c.SetName('c')
+for i in range(tetra.GetOutput().GetNumberOfCells()): c.InsertNextValue(i * 0.5)
+tetra.GetOutput().GetCellData().AddArray(c)
+e = vtk.vtkExodusIIWriter(); e.SetInputDataObject(tetra.GetOutput()); e.SetFileName(folder + '/tetra.exo')
+e.WriteOutBlockIdArrayOff(); e.Write()
+r = vtk.vtkExodusIIReader(); r.SetFileName(folder + '/tetra.exo'); r.UpdateInformation()
+r.ApplyDisplacementsOff()
+for kind in (r.NODAL, r.ELEM_BLOCK):
+    for i in range(r.GetNumberOfObjectArrays(kind)):
+        r.SetObjectArrayStatus(kind, r.GetObjectArrayName(kind, i), 1)
+r.Update()
+block = r.GetOutput().GetBlock(0).GetBlock(0)
+w = vtk.vtkXMLUnstructuredGridWriter(); w.SetInputDataObject(block); w.SetFileName(folder + '/tetra.ref')
+w.Write()
+";
+
+#[test]
+fn xdmf_and_exodus_files_of_vtk() {
+    let Some(python) = peer::python_with_vtk("xdmf_and_exodus_files_of_vtk") else { return };
+    let dir = tempfile::tempdir().unwrap();
+    peer::run(&python, WRITE_OTHERS, &[dir.path().to_str().unwrap()]);
+    let read = |name: &str| {
+        let opened = open(dir.path().join(name)).unwrap_or_else(|e| panic!("{e}"));
+        (opened.format, opened.dataset().unwrap().clone())
+    };
+    for name in ["image", "grid", "rect", "curved"] {
+        let ((format, ours), (_, theirs)) = (read(&format!("{name}.xmf")), read(&format!("{name}.ref")));
+        assert_eq!((format, ours.kind(), ours.counts()), ("XDMF", theirs.kind(), theirs.counts()));
+        let (a, b) = (&ours.attributes().unwrap().point[0], &theirs.attributes().unwrap().point[0]);
+        assert_eq!(a.name, b.name);
+        // The XML has six digits.
+        for i in 0..a.tuples() {
+            assert!((a.get(i, 0) - b.get(i, 0)).abs() <= 1e-5 * b.get(i, 0).abs(), "{name} {i}");
+        }
+        match (&ours, &theirs) {
+            (Dataset::ImageData(a), Dataset::ImageData(b)) => {
+                assert_eq!(a.point(1, 2, 3), b.point(1, 2, 3));
+            }
+            (Dataset::UnstructuredGrid(a), Dataset::UnstructuredGrid(b)) => {
+                assert_eq!((&a.points, &a.cells, &a.types), (&b.points, &b.cells, &b.types));
+            }
+            (Dataset::RectilinearGrid(a), Dataset::RectilinearGrid(b)) => {
+                assert_eq!(a.coordinates, b.coordinates);
+            }
+            (Dataset::StructuredGrid(a), Dataset::StructuredGrid(b)) => {
+                assert_eq!(a.points, b.points);
+            }
+            _ => panic!("{name}"),
+        }
+    }
+    let ((format, ours), (_, theirs)) = (read("tetra.exo"), read("tetra.ref"));
+    assert_eq!((format, ours.counts()), ("Exodus II", theirs.counts()));
+    let (Dataset::UnstructuredGrid(ours), Dataset::UnstructuredGrid(theirs)) = (ours, theirs) else {
+        panic!()
+    };
+    assert_eq!((&ours.cells, &ours.types), (&theirs.cells, &theirs.types));
+    for i in 0..ours.points.len() {
+        assert_eq!(ours.points.get(i), theirs.points.get(i));
+    }
+    for (a, b) in [
+        (ours.attributes.point_array("RTData"), theirs.attributes.point_array("RTData")),
+        (ours.attributes.cell_array("c"), theirs.attributes.cell_array("c")),
+    ] {
+        let (a, b) = (a.expect("ours"), b.expect("theirs"));
+        assert!((0..a.tuples()).all(|i| a.get(i, 0) == b.get(i, 0)), "{}", a.name);
+    }
+}
+
+#[test]
+fn xdmf_times_that_share_a_mesh_and_boxes_of_hdf5() {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::copy(file("old.h5"), dir.path().join("old.h5")).unwrap();
+    let grid = |time: f64, row: u32| {
+        format!(
+            r#"<Grid><xi:include xpointer="xpointer(//Grid[@Name=&quot;mesh&quot;]/*[self::Topology
+            or self::Geometry])"/><Time Value="{time}"/><Attribute Name="T" Center="Node">
+            <DataItem ItemType="HyperSlab" Dimensions="1 7">
+            <DataItem Dimensions="3 2" Format="XML" NumberType="Int">{row} 0 1 1 1 7</DataItem>
+            <DataItem Dimensions="5 7" Format="HDF" Precision="8">old.h5:/contiguous</DataItem>
+            </DataItem></Attribute></Grid>"#
+        )
+    };
+    let text = format!(
+        r#"<?xml version="1.0"?><Xdmf xmlns:xi="http://www.w3.org/2003/XInclude"><Domain>
+        <Grid Name="s" GridType="Collection" CollectionType="Temporal">{}{}</Grid>
+        <Grid Name="mesh"><Topology TopologyType="Mixed" NumberOfElements="2">
+        <DataItem Dimensions="10" NumberType="Int" Format="XML">9 0 1 2 3 4 5 6 6 4</DataItem>
+        </Topology></Grid></Domain></Xdmf>"#,
+        grid(0.5, 1),
+        grid(0.25, 3),
+    );
+    let path = dir.path().join("a.xdmf");
+    let write = |text: &str| std::fs::write(&path, text).unwrap();
+    write(&text);
+    let error = open(&path).unwrap_err().to_string();
+    assert!(error.contains("no `Geometry`"), "{error}");
+    let points = "<Geometry GeometryType='XY'><DataItem Dimensions='7 2' Format='XML'>\
+                  0 0 1 0 1 1 0 1 2 0 2 1 3 1</DataItem></Geometry></Grid></Domain>";
+    let text = text.replace("</Grid></Domain>", points);
+    write(&text);
+    let error = open(&path).unwrap_err().to_string();
+    assert!(error.contains("a cell of") || error.contains("cells of type"), "{error}");
+    let text = text.replace(r#""10" NumberType"#, r#""9" NumberType"#);
+    let text = text.replace("9 0 1 2 3 4 5 6 6 4", "5 0 1 2 3 4 1 4");
+    write(&text);
+    let error = open(&path).unwrap_err().to_string();
+    assert!(error.contains("8 values instead of the 9"), "{error}");
+    write(&text.replace("5 0 1 2 3 4 1 4", "5 0 1 2 3 4 1 4 2"));
+    let opened = open(&path).unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(opened.time_steps.iter().map(|s| s.time).collect::<Vec<_>>(), [0.25, 0.5]);
+    let row = |opened: &datasets::read::LoadedFile| {
+        let Dataset::UnstructuredGrid(grid) = opened.dataset().unwrap() else { panic!() };
+        assert_eq!((grid.types.clone(), grid.cells.get(1)), (vec![9, 5], &[1, 4, 2][..]));
+        let t = grid.attributes.point_array("T").unwrap();
+        (0..7).map(|i| t.get(i, 0)).collect::<Vec<_>>()
+    };
+    assert_eq!(row(&opened), [21., 22., 23., 24., 25., 26., 27.]);
+    let second = open(&opened.time_steps[1].path).unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(row(&second), [7., 8., 9., 10., 11., 12., 13.]);
+}

@@ -10,7 +10,8 @@ use std::path::Path;
 
 /// The supported formats, for messages.
 pub const KNOWN: &str = "VTK XML (.vti .vtp .vtu .vtr .vts, their parallel forms, .pvd, .vtm, .series), VTK \
-                         legacy (.vtk), VTKHDF (.vtkhdf), NetCDF (.nc), XDMF (.xdmf .xmf), \
+                         legacy (.vtk), VTKHDF (.vtkhdf), NetCDF (.nc), Exodus II (.e .exo), \
+                         XDMF (.xdmf .xmf), \
                          PLOT3D (.xyz .x .g .q .bin), NRRD (.nrrd .nhdr), MetaImage (.mhd .mha), \
                          raw with TOML (.raw), NumPy (.npy .npz), OpenFOAM cases (folders, .foam), OBJ, glTF, PLY, STL";
 
@@ -137,8 +138,10 @@ pub fn open_with(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Loaded
         Format::Ply => ply::read(path),
         Format::Stl => stl::read(path),
     }?;
+    // `.g` is PLOT3D's and Exodus II's.
     if let (Some(content), Some(name)) = (by_content, by_name)
         && content != name
+        && content != Format::NetCdf
     {
         opened.warnings.push(format!("the name says {name:?}, the content is {}", opened.format));
     }
@@ -208,7 +211,7 @@ fn from_name(path: &Path) -> Option<Format> {
         "vtk" => Format::VtkLegacy,
         "xdmf" | "xmf" | "xdmf2" | "xdmf3" => Format::Xdmf,
         "vtkhdf" => Format::VtkHdf,
-        "nc" | "nc4" | "cdf" => Format::NetCdf,
+        "nc" | "nc4" | "cdf" | "e" | "exo" | "ex2" | "exii" => Format::NetCdf,
         "xyz" | "x" | "g" | "grid" | "p3d" | "q" | "sol" => Format::Plot3d,
         "nrrd" | "nhdr" => Format::Nrrd,
         "mhd" | "mha" => Format::MetaImage,

@@ -230,4 +230,13 @@ impl Container for ClassicFile {
         }
         Ok(Values::from_bytes(place.kind, &out, Endian::Big))
     }
+
+    fn characters(&self, variable: usize) -> Result<Vec<u8>, Fault> {
+        let v = &self.header.variables[variable];
+        let dims: Vec<u64> = v.axes.iter().map(|&a| self.header.dimensions[a].length).collect();
+        match self.values(variable, &vec![0; dims.len()], &dims)? {
+            Values::U8(bytes) if !v.is_number => Ok(bytes),
+            _ => Err(Fault::field(format!("variable `{}`", v.name), "it does not hold texts")),
+        }
+    }
 }

@@ -1,10 +1,12 @@
-//! NetCDF: classic files (CDF-1, CDF-2, CDF-5) and NetCDF-4, which is HDF5. Variables on the
+//! NetCDF: classic files (CDF-1, CDF-2, CDF-5) and NetCDF-4, which is HDF5. Exodus II files are
+//! read as meshes ([`exodus`]). Otherwise, variables on the
 //! lattice that their coordinate variables span become image data or a rectilinear grid.
 //!
 //! Source: "NetCDF Classic Format Specification" and "NetCDF-4 format" (Unidata), "CF Metadata
 //! Conventions 1.11".
 
 mod classic;
+pub(crate) mod exodus;
 mod lattice;
 mod netcdf4;
 mod units;
@@ -72,6 +74,8 @@ pub(super) trait Container {
     fn header(&self) -> &Header;
     /// The numbers of a box of a variable.
     fn values(&self, variable: usize, start: &[u64], count: &[u64]) -> Result<Values, Fault>;
+    /// All characters of a variable of texts.
+    fn characters(&self, variable: usize) -> Result<Vec<u8>, Fault>;
 }
 
 /// Reads a NetCDF file, or one of its times.
@@ -88,7 +92,12 @@ pub(crate) fn read(path: &Path, options: &OpenOptions) -> Result<LoadedFile, Rea
         Err(f) => return Err(fault(f)),
     };
     let mut warnings = container.header().warnings.clone();
-    let (data, time_steps) =
-        lattice::dataset(path, &*container, options, &mut warnings).map_err(fault)?;
-    Ok(LoadedFile { format: FORMAT, content: Content::Data(data), warnings, time_steps })
+    let is_exodus = exodus::is_exodus(container.header());
+    let (read, format): (fn(_, &dyn Container, _, _) -> _, _) = match is_exodus {
+        true => (exodus::dataset, exodus::FORMAT),
+        false => (lattice::dataset, FORMAT),
+    };
+    let (data, time_steps) = read(path, &*container, options, &mut warnings)
+        .map_err(|f: Fault| f.in_file(path, format))?;
+    Ok(LoadedFile { format, content: Content::Data(data), warnings, time_steps })
 }

@@ -126,4 +126,15 @@ impl Container for Netcdf4File {
         let name = self.header.variables[variable].name.clone();
         self.file.at(self.addresses[variable], format!("/{name}"))?.values_in(start, count)
     }
+
+    fn characters(&self, variable: usize) -> Result<Vec<u8>, Fault> {
+        let name = &self.header.variables[variable].name;
+        match self.file.at(self.addresses[variable], format!("/{name}"))?.read()? {
+            // One text a character; that of a zero is empty.
+            Data::Texts(t) => {
+                Ok(t.iter().map(|t| t.as_bytes().first().copied().unwrap_or(0)).collect())
+            }
+            _ => Err(Fault::field(format!("variable `{name}`"), "it does not hold texts")),
+        }
+    }
 }
