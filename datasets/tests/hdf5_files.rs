@@ -1,4 +1,4 @@
-//! VTKHDF and NetCDF: files that h5py and netCDF4 wrote (`tests/files/make.py`), and what VTK
+//! VTKHDF, NetCDF, XDMF and Exodus II: files that h5py and netCDF4 wrote (`tests/files/make.py`), and what VTK
 //! itself writes.
 
 mod peer;
@@ -214,34 +214,32 @@ for name, data, writer in (('image', wave.GetOutput(), vtk.vtkXMLImageDataWriter
     x = vtk.vtkXdmfWriter(); x.SetInputDataObject(data); x.SetFileName(f'{folder}/{name}.xmf')
     x.SetLightDataLimit(0 if name == 'grid' else 100000); x.Write()
     writer.SetInputDataObject(data); writer.SetFileName(f'{folder}/{name}.ref'); writer.Write()
-tetra = vtk.vtkDataSetTriangleFilter(); tetra.SetInputData(grid.GetOutput()); tetra.Update()
-c = vtk.vtkDoubleArray(); c.SetName('c')
-for i in range(tetra.GetOutput().GetNumberOfCells()): c.InsertNextValue(i * 0.5)
-tetra.GetOutput().GetCellData().AddArray(c)
-e = vtk.vtkExodusIIWriter(); e.SetInputDataObject(tetra.GetOutput()); e.SetFileName(folder + '/tetra.exo')
-e.WriteOutBlockIdArrayOff(); e.Write()
-r = vtk.vtkExodusIIReader(); r.SetFileName(folder + '/tetra.exo'); r.UpdateInformation()
-r.ApplyDisplacementsOff()
+r = vtk.vtkExodusIIReader(); r.SetFileName(sys.argv[2]); r.UpdateInformation()
+r.ApplyDisplacementsOff(); r.SetTimeStep(0)
 for kind in (r.NODAL, r.ELEM_BLOCK):
     for i in range(r.GetNumberOfObjectArrays(kind)):
         r.SetObjectArrayStatus(kind, r.GetObjectArrayName(kind, i), 1)
 r.Update()
-block = r.GetOutput().GetBlock(0).GetBlock(0)
-w = vtk.vtkXMLUnstructuredGridWriter(); w.SetInputDataObject(block); w.SetFileName(folder + '/tetra.ref')
-w.Write()
+for i in range(2):
+    w = vtk.vtkXMLUnstructuredGridWriter()
+    w.SetInputDataObject(r.GetOutput().GetBlock(0).GetBlock(i)); w.SetFileName(f'{folder}/block{i}.ref')
+    w.Write()
 ";
 
 #[test]
 fn xdmf_and_exodus_files_of_vtk() {
     let Some(python) = peer::python_with_vtk("xdmf_and_exodus_files_of_vtk") else { return };
     let dir = tempfile::tempdir().unwrap();
-    peer::run(&python, WRITE_OTHERS, &[dir.path().to_str().unwrap()]);
+    let exodus = file("offset.exo");
+    let args = [dir.path().to_str().unwrap(), exodus.to_str().unwrap()];
+    peer::run(&python, WRITE_OTHERS, &args);
     let read = |name: &str| {
         let opened = open(dir.path().join(name)).unwrap_or_else(|e| panic!("{e}"));
         (opened.format, opened.dataset().unwrap().clone())
     };
     for name in ["image", "grid", "rect", "curved"] {
-        let ((format, ours), (_, theirs)) = (read(&format!("{name}.xmf")), read(&format!("{name}.ref")));
+        let ((format, ours), (_, theirs)) =
+            (read(&format!("{name}.xmf")), read(&format!("{name}.ref")));
         assert_eq!((format, ours.kind(), ours.counts()), ("XDMF", theirs.kind(), theirs.counts()));
         let (a, b) = (&ours.attributes().unwrap().point[0], &theirs.attributes().unwrap().point[0]);
         assert_eq!(a.name, b.name);
@@ -265,21 +263,57 @@ fn xdmf_and_exodus_files_of_vtk() {
             _ => panic!("{name}"),
         }
     }
-    let ((format, ours), (_, theirs)) = (read("tetra.exo"), read("tetra.ref"));
-    assert_eq!((format, ours.counts()), ("Exodus II", theirs.counts()));
-    let (Dataset::UnstructuredGrid(ours), Dataset::UnstructuredGrid(theirs)) = (ours, theirs) else {
-        panic!()
-    };
-    assert_eq!((&ours.cells, &ours.types), (&theirs.cells, &theirs.types));
-    for i in 0..ours.points.len() {
-        assert_eq!(ours.points.get(i), theirs.points.get(i));
+    // VTK makes a data set of each block, with the points that it uses.
+    let ours = at("offset.exo", None);
+    let Dataset::UnstructuredGrid(ours) = ours.dataset().unwrap() else { panic!() };
+    let mut cell = 0;
+    for i in 0..2 {
+        let (_, Dataset::UnstructuredGrid(block)) = read(&format!("block{i}.ref")) else {
+            panic!()
+        };
+        let (a, b) = (&ours.attributes, &block.attributes);
+        for k in 0..block.cells.len() {
+            assert_eq!(ours.types[cell], block.types[k]);
+            for (&x, &y) in ours.cells.get(cell).iter().zip(block.cells.get(k)) {
+                let (x, y) = (x as usize, y as usize);
+                assert_eq!(ours.points.get(x), block.points.get(y));
+                for name in ["T", "p"] {
+                    let (a, b) = (a.point_array(name).unwrap(), b.point_array(name).unwrap());
+                    assert_eq!(a.get(x, 0), b.get(y, 0), "{name}");
+                }
+            }
+            if let Some(c) = b.cell_array("c").filter(|_| i == 0) {
+                assert_eq!(a.cell_array("c").unwrap().get(cell, 0), c.get(k, 0));
+            }
+            cell += 1;
+        }
     }
-    for (a, b) in [
-        (ours.attributes.point_array("RTData"), theirs.attributes.point_array("RTData")),
-        (ours.attributes.cell_array("c"), theirs.attributes.cell_array("c")),
-    ] {
-        let (a, b) = (a.expect("ours"), b.expect("theirs"));
-        assert!((0..a.tuples()).all(|i| a.get(i, 0) == b.get(i, 0)), "{}", a.name);
+    assert_eq!(cell, ours.cells.len());
+}
+
+#[test]
+fn exodus_blocks_and_times_in_both_forms_of_netcdf() {
+    for name in ["offset.exo", "netcdf4.exo"] {
+        for (time, shift) in [(None, 0.0), (Some(0.5), 100.0)] {
+            let opened = at(name, time);
+            assert_eq!((opened.format, opened.time_steps.len()), ("Exodus II", 2));
+            let Dataset::UnstructuredGrid(grid) = opened.dataset().unwrap() else { panic!() };
+            assert_eq!(grid.types, [12, 10, 10]);
+            assert_eq!(grid.cells.get(2), [1, 5, 6, 8]);
+            assert_eq!(grid.points.get(8).to_array(), [2.0, 0.0, 0.5]);
+            let a = &grid.attributes;
+            assert_eq!(a.cell_array("ObjectId").unwrap().values, Values::I32(vec![10, 20, 20]));
+            for (variable, first) in [("T", 0.0), ("p", 10.0)] {
+                let v = a.point_array(variable).unwrap();
+                assert!((0..9).all(|i| v.get(i, 0) == i as f64 + first + shift), "{variable}");
+            }
+            let c = a.cell_array("c").unwrap();
+            assert_eq!(c.get(0, 0), if shift > 0.0 { 8.0 } else { 7.0 });
+            assert!(c.get(1, 0).is_nan() && c.get(2, 0).is_nan());
+            let text = opened.warnings.join("\n");
+            assert!(text.contains("`c` is NaN in blocks without it: 2"), "{text}");
+            assert_eq!(a.text[0].1, ["cube", "side"]);
+        }
     }
 }
 

@@ -96,7 +96,8 @@ pub fn open_with(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Loaded
     let length = file.metadata().map_err(|e| io_error(path, e))?.len();
     file.take(HEAD_BYTES).read_to_end(&mut head).map_err(|e| io_error(path, e))?;
 
-    let by_content = match head.starts_with(hdf5::MAGIC) || head.get(512..520) == Some(hdf5::MAGIC) {
+    let by_content = match head.starts_with(hdf5::MAGIC) || head.get(512..520) == Some(hdf5::MAGIC)
+    {
         true => Some(from_hdf5(path)?),
         false => from_content(&head, length),
     };
@@ -182,8 +183,10 @@ fn from_content(head: &[u8], length: u64) -> Option<Format> {
 /// What an HDF5 file holds, by the names in it.
 fn from_hdf5(path: &Path) -> Result<Format, ReadError> {
     let file = hdf5::Hdf5File::open(path, hdf5::FORMAT)?;
-    let of_names = || {
+    let mut is_cgns = false;
+    let mut of_names = || {
         let names = file.root()?.names()?;
+        is_cgns = names.iter().any(|n| n == "CGNSLibraryVersion");
         if names.iter().any(|n| n == vtkhdf::ROOT) {
             return Ok(Some(Format::VtkHdf));
         }
@@ -191,8 +194,14 @@ fn from_hdf5(path: &Path) -> Result<Format, ReadError> {
     };
     let found = of_names().map_err(|f: Fault| f.in_file(path, hdf5::FORMAT))?;
     found.ok_or_else(|| {
-        let what = "an HDF5 file that is neither VTKHDF nor NetCDF-4".into();
-        ReadError::UnknownFormat { path: path.to_path_buf(), what, known: KNOWN }
+        let what = match is_cgns {
+            true => "a CGNS file: open it in ParaView and save it as .vtu or .vtm",
+            false => {
+                "an HDF5 file that is neither VTKHDF nor NetCDF-4: describe it with an .xdmf file, \
+                 or save it as .vtu with ParaView"
+            }
+        };
+        ReadError::UnknownFormat { path: path.to_path_buf(), what: what.into(), known: KNOWN }
     })
 }
 

@@ -18,7 +18,10 @@ pub(crate) fn choose(
     warnings: &mut Vec<String>,
 ) -> Result<(usize, Vec<TimeStep>), Fault> {
     if times.len() > MOST {
-        return Err(Fault::field("the times", format!("{} of them, more than {MOST}", times.len())));
+        return Err(Fault::field(
+            "the times",
+            format!("{} of them, more than {MOST}", times.len()),
+        ));
     }
     let step = |&time: &f64| TimeStep { time, part: 0, path: path.join(time.to_string()) };
     let steps: Vec<TimeStep> = times.iter().map(step).collect();

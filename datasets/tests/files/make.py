@@ -19,8 +19,6 @@ def hdf5(name, libver):
         f.create_dataset("filtered", data=counted((20, 30), "f4"), chunks=(6, 7),
                          compression="gzip", shuffle=True, fletcher32=True)
         f.create_dataset("one chunk", data=counted((6, 7)), chunks=(6, 7), compression="gzip")
-        f.create_dataset("growing twice", data=counted((12, 13), "i8"), chunks=(5, 4),
-                         maxshape=(None, None))
         f.create_dataset("enumerated", data=counted((2, 3), "i1"),
                          dtype=h5py.enum_dtype({"a": 0, "b": 1}, basetype="i1"))
         plist = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
@@ -29,6 +27,8 @@ def hdf5(name, libver):
         d = h5py.h5d.create(f.id, b"compact", h5py.h5t.IEEE_F64LE, space, plist)
         d.write(h5py.h5s.ALL, h5py.h5s.ALL, counted((3, 5)))
         if libver == "latest":
+            f.create_dataset("growing twice", data=counted((12, 13), "i8"), chunks=(5, 4),
+                             maxshape=(None, None))
             f.create_dataset("growing", data=counted((50, 3), "u1"), chunks=(1, 2),
                              maxshape=(None, 3))
             f.create_dataset("growing across", data=counted((3, 40), "u2"), chunks=(2, 1),
@@ -107,7 +107,46 @@ def netcdf(name, form):
         v[:] = 1
 
 
+def exodus(name, form):
+    """A hexahedron and two tetrahedra in blocks 10 and 20, with two times."""
+    with netCDF4.Dataset(name, "w", format=form) as f:
+        f.api_version, f.version = np.float32(5.1), np.float32(5.1)
+        f.floating_point_word_size, f.file_size, f.title = 8, 1, "two blocks"
+        for dim, n in dict(time_step=None, len_string=33, len_name=33, num_dim=3, num_nodes=9,
+                           num_elem=3, num_el_blk=2, num_el_in_blk1=1, num_nod_per_el1=8,
+                           num_el_in_blk2=2, num_nod_per_el2=4, num_nod_var=2,
+                           num_elem_var=1).items():
+            f.createDimension(dim, 2 if dim == "time_step" and form == "NETCDF4" else n)
+        t = f.createVariable("time_whole", "f8", ("time_step",))
+        t[:] = [0.0, 0.5]
+        f.createVariable("eb_status", "i4", ("num_el_blk",))[:] = 1
+        ids = f.createVariable("eb_prop1", "i4", ("num_el_blk",))
+        ids.setncattr("name", "ID")
+        ids[:] = [10, 20]
+        corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1],
+                            [1, 1, 1], [0, 1, 1], [2, 0, 0.5]])
+        for axis, x in zip("xyz", corners.T):
+            f.createVariable(f"coord{axis}", "f8", ("num_nodes",))[:] = x
+        c = f.createVariable("connect1", "i4", ("num_el_in_blk1", "num_nod_per_el1"))
+        c.elem_type, c[:] = "HEX8", [[1, 2, 3, 4, 5, 6, 7, 8]]
+        c = f.createVariable("connect2", "i4", ("num_el_in_blk2", "num_nod_per_el2"))
+        c.elem_type, c[:] = "TETRA", [[2, 3, 7, 9], [2, 6, 7, 9]]
+        for dim, names in (("num_nod_var", ["T", "p"]), ("num_elem_var", ["c"]),
+                           ("num_el_blk", ["cube", "side"])):
+            variable = {"num_nod_var": "name_nod_var", "num_elem_var": "name_elem_var"}
+            v = f.createVariable(variable.get(dim, "eb_names"), "S1", (dim, "len_name"))
+            v[:] = np.array([[*n.ljust(33, "\0")] for n in names], "S1")
+        f.createVariable("elem_var_tab", "i4", ("num_el_blk", "num_elem_var"))[:] = [[1], [0]]
+        for i in range(2):
+            v = f.createVariable(f"vals_nod_var{i + 1}", "f8", ("time_step", "num_nodes"))
+            v[0], v[1] = np.arange(9) + 10 * i, np.arange(9) + 10 * i + 100
+        v = f.createVariable("vals_elem_var1eb1", "f8", ("time_step", "num_el_in_blk1"))
+        v[0], v[1] = [7.0], [8.0]
+
+
 if __name__ == "__main__":
+    exodus("offset.exo", "NETCDF3_64BIT_OFFSET")
+    exodus("netcdf4.exo", "NETCDF4")
     image("image.vtkhdf", [])
     image("times.vtkhdf", [0.0, 0.5, 2.0])
     netcdf("classic.nc", "NETCDF3_CLASSIC")

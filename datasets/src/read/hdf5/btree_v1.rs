@@ -3,6 +3,9 @@
 use super::source::Source;
 use crate::read::error::{At, BROKEN, Fault};
 
+/// What is called with a key and its child.
+pub(super) type Leaf<'a> = dyn FnMut(&[u8], u64) -> Result<(), Fault> + 'a;
+
 /// Calls `leaf` with the key and the child of every entry of the leaves, in order. A key has
 /// `key_size` bytes.
 pub(super) fn visit(
@@ -10,7 +13,7 @@ pub(super) fn visit(
     root: u64,
     kind: u8,
     key_size: usize,
-    leaf: &mut dyn FnMut(&[u8], u64) -> Result<(), Fault>,
+    leaf: &mut Leaf<'_>,
 ) -> Result<(), Fault> {
     visit_level(source, root, kind, key_size, None, leaf)
 }
@@ -21,7 +24,7 @@ fn visit_level(
     kind: u8,
     key_size: usize,
     expected: Option<u8>,
-    leaf: &mut dyn FnMut(&[u8], u64) -> Result<(), Fault>,
+    leaf: &mut Leaf<'_>,
 ) -> Result<(), Fault> {
     let head = source.bytes(address, 8 + 2 * source.offset_size as u64, "a B-tree node")?;
     let mut f = source.fields(&head, address);

@@ -22,13 +22,16 @@ struct Tree<'s> {
     levels: Vec<Level>,
 }
 
+/// What is called with a record and its type.
+pub(super) type Visit<'a> = dyn FnMut(&[u8], u8) -> Result<(), Fault> + 'a;
+
 /// Calls `visit` with every record of the tree at `address`, in order. `kinds` are the types of
 /// records that are expected. The second argument is the type.
 pub(super) fn records(
     source: &Source,
     address: u64,
     kinds: &[u8],
-    visit: &mut dyn FnMut(&[u8], u8) -> Result<(), Fault>,
+    visit: &mut Visit<'_>,
 ) -> Result<(), Fault> {
     let size = 22 + source.offset_size as u64 + source.length_size as u64;
     let head = source.bytes(address, size, "a B-tree")?;
@@ -43,7 +46,10 @@ pub(super) fn records(
     f.skip(2)?;
     let root = f.address()?;
     let count = u64::from(f.u16()?);
-    if !kinds.contains(&kind) || record_size == 0 || node_size < 10 + record_size as u64 || depth > 32
+    if !kinds.contains(&kind)
+        || record_size == 0
+        || node_size < 10 + record_size as u64
+        || depth > 32
     {
         let what = format!("a B-tree of type {kind}, depth {depth} and {record_size}-byte records");
         return Err(Fault::new(At::Byte(address), what, BROKEN));
@@ -74,16 +80,15 @@ impl Tree<'_> {
         address: u64,
         count: u64,
         depth: usize,
-        visit: &mut dyn FnMut(&[u8], u8) -> Result<(), Fault>,
+        visit: &mut Visit<'_>,
     ) -> Result<(), Fault> {
         let pointer = match depth.checked_sub(1) {
             None => 0,
-            Some(below) => {
-                self.source.offset_size + self.count_size + self.levels[below].sum_size
-            }
+            Some(below) => self.source.offset_size + self.count_size + self.levels[below].sum_size,
         };
         let body = count.saturating_mul(self.record_size as u64);
-        let pointers = if depth > 0 { count.saturating_add(1).saturating_mul(pointer as u64) } else { 0 };
+        let pointers =
+            if depth > 0 { count.saturating_add(1).saturating_mul(pointer as u64) } else { 0 };
         let size = body.saturating_add(pointers).saturating_add(10);
         if size > self.node_size {
             let what = format!("{count} records in a B-tree node of {} bytes", self.node_size);

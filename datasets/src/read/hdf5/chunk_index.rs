@@ -108,16 +108,18 @@ pub(super) fn chunks(
         }
         Kind::FixedArray => fixed_array(source, address, grid, &mut numbered)?,
         Kind::ExtensibleArray => extensible_array(source, address, grid, &mut numbered)?,
-        Kind::BtreeV1 => btree_v1::visit(source, address, 1, 8 + 8 * (rank + 1), &mut |key, at| {
-            let mut f = source.fields(key, at);
-            let (size, mask) = (u64::from(f.u32()?), f.u32()?);
-            let mut position = Vec::with_capacity(rank);
-            for &c in grid.chunk {
-                position.push(f.uint(8)? / c);
-            }
-            out.push(Chunk { position, address: at, size, mask });
-            Ok(())
-        })?,
+        Kind::BtreeV1 => {
+            btree_v1::visit(source, address, 1, 8 + 8 * (rank + 1), &mut |key, at| {
+                let mut f = source.fields(key, at);
+                let (size, mask) = (u64::from(f.u32()?), f.u32()?);
+                let mut position = Vec::with_capacity(rank);
+                for &c in grid.chunk {
+                    position.push(f.uint(8)? / c);
+                }
+                out.push(Chunk { position, address: at, size, mask });
+                Ok(())
+            })?
+        }
         Kind::BtreeV2 => btree_v2::records(source, address, &[10, 11], &mut |record, kind| {
             let mut f = source.fields(record, address);
             let element = record.len().saturating_sub(8 * rank);
@@ -230,8 +232,11 @@ fn extensible_array(
     f.skip(source.length_size)?;
     let Some(index) = f.address()? else { return Ok(()) };
     let bad = |what: String| Fault::new(At::Byte(address), what, BROKEN);
-    if !smallest.is_power_of_two() || !pointers.is_power_of_two() || bits > 64
-        || smallest.ilog2() > bits || each == 0
+    if !smallest.is_power_of_two()
+        || !pointers.is_power_of_two()
+        || bits > 64
+        || smallest.ilog2() > bits
+        || each == 0
     {
         return Err(bad(format!("an extensible array of blocks of {smallest}, {pointers}")));
     }
@@ -249,31 +254,32 @@ fn extensible_array(
     elements(source, grid, at, 0, in_index, each, visit)?;
     at = at.saturating_add(in_index * each as u64);
     let width = source.offset_size as u64;
-    let names = source.bytes(at, (data_addresses + super_addresses) * width, "an array of chunks")?;
+    let names =
+        source.bytes(at, (data_addresses + super_addresses) * width, "an array of chunks")?;
     let mut names = source.fields(&names, at);
 
-    let data_block = |at: Option<u64>, first: u64, count: u64, bitmap: Option<&[u8]>,
-                      visit: Numbered<'_>| {
-        let Some(block) = at else { return Ok(()) };
-        let head_size = (prefix + position_size) as u64;
-        let head = source.bytes(block, head_size, "a block of an extensible array")?;
-        source.fields(&head, block).signature(b"EADB")?;
-        let mut at = block.saturating_add(head_size);
-        if count <= per_page {
-            return elements(source, grid, at, first, count, each, visit);
-        }
-        at = at.saturating_add(4);
-        for page in 0..count / per_page {
-            let there = bitmap.is_none_or(|b| {
-                b.get(page as usize / 8).is_some_and(|b| b & (0x80 >> (page % 8)) != 0)
-            });
-            if there {
-                elements(source, grid, at, first + page * per_page, per_page, each, visit)?;
+    let data_block =
+        |at: Option<u64>, first: u64, count: u64, bitmap: Option<&[u8]>, visit: Numbered<'_>| {
+            let Some(block) = at else { return Ok(()) };
+            let head_size = (prefix + position_size) as u64;
+            let head = source.bytes(block, head_size, "a block of an extensible array")?;
+            source.fields(&head, block).signature(b"EADB")?;
+            let mut at = block.saturating_add(head_size);
+            if count <= per_page {
+                return elements(source, grid, at, first, count, each, visit);
             }
-            at = at.saturating_add(per_page.saturating_mul(each as u64).saturating_add(4));
-        }
-        Ok::<(), Fault>(())
-    };
+            at = at.saturating_add(4);
+            for page in 0..count / per_page {
+                let there = bitmap.is_none_or(|b| {
+                    b.get(page as usize / 8).is_some_and(|b| b & (0x80 >> (page % 8)) != 0)
+                });
+                if there {
+                    elements(source, grid, at, first + page * per_page, per_page, each, visit)?;
+                }
+                at = at.saturating_add(per_page.saturating_mul(each as u64).saturating_add(4));
+            }
+            Ok::<(), Fault>(())
+        };
 
     let mut first = in_index;
     for block in 0..blocks.min(62) {
@@ -297,9 +303,8 @@ fn extensible_array(
         let pages = if per_block > per_page { per_block / per_page } else { 0 };
         let bitmap_size = pages.div_ceil(8);
         let head_size = (prefix + position_size) as u64;
-        let size = count
-            .saturating_mul(bitmap_size.saturating_add(width))
-            .saturating_add(head_size);
+        let size =
+            count.saturating_mul(bitmap_size.saturating_add(width)).saturating_add(head_size);
         let body = source.bytes(at, size, "a block of an extensible array")?;
         let mut f = source.fields(&body, at);
         f.signature(b"EASB")?;

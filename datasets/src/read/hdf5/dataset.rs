@@ -105,9 +105,7 @@ impl<'s> Stored<'s> {
                 Ok(out)
             }
             Layout::Contiguous(None) => self.filled(total),
-            Layout::Contiguous(Some(address)) => {
-                self.contiguous(*address, start, count, total)
-            }
+            Layout::Contiguous(Some(address)) => self.contiguous(*address, start, count, total),
             Layout::Chunked { index, address, chunk, plain_border } => {
                 self.source.allow(total, "the values of a dataset")?;
                 let bytes = chunk.iter().try_fold(each, |n, &c| n.checked_mul(c));
@@ -212,9 +210,8 @@ impl Window<'_> {
             return;
         }
         let low: Vec<u64> = (0..rank).map(|a| first[a].max(self.start[a])).collect();
-        let high: Vec<u64> = (0..rank)
-            .map(|a| (first[a] + size[a]).min(self.start[a] + self.count[a]))
-            .collect();
+        let high: Vec<u64> =
+            (0..rank).map(|a| (first[a] + size[a]).min(self.start[a] + self.count[a])).collect();
         if (0..rank).any(|a| low[a] >= high[a]) {
             return;
         }

@@ -76,7 +76,9 @@ impl Datatype {
                 match (size, layout) {
                     (4, [23, 8, 0, 23]) if ieee => Kind::Number(ScalarType::F32, endian),
                     (8, [52, 11, 0, 52]) if ieee => Kind::Number(ScalarType::F64, endian),
-                    _ => other(format!("floats of {precision} bits that are not IEEE's of 32 or 64")),
+                    _ => {
+                        other(format!("floats of {precision} bits that are not IEEE's of 32 or 64"))
+                    }
                 }
             }
             2 => other("times".into()),
@@ -131,9 +133,7 @@ impl Datatype {
             Ok::<(), Fault>(())
         };
         Ok(match &self.kind {
-            Kind::Number(kind, endian) => {
-                Data::Numbers(Values::from_bytes(*kind, bytes, *endian))
-            }
+            Kind::Number(kind, endian) => Data::Numbers(Values::from_bytes(*kind, bytes, *endian)),
             Kind::Text => Data::Texts(bytes.chunks_exact(self.size).map(text).collect()),
             Kind::VariableText => {
                 let mut out = Vec::new();
@@ -212,7 +212,8 @@ impl Dataspace {
             return Err(Fault::new(at, format!("{rank} axes; HDF5 allows 32"), BROKEN));
         }
         let dims: Vec<u64> = (0..rank).map(|_| f.length()).collect::<Result<_, _>>()?;
-        let unlimited = if source.length_size == 8 { u64::MAX } else { (1 << (8 * source.length_size)) - 1 };
+        let unlimited =
+            if source.length_size == 8 { u64::MAX } else { (1 << (8 * source.length_size)) - 1 };
         let max = if flags & 1 != 0 {
             let of = |m: u64| (m != unlimited).then_some(m);
             (0..rank).map(|_| f.length().map(of)).collect::<Result<_, _>>()?

@@ -82,7 +82,8 @@ pub(super) fn undo(
                 // A checksum may have been packed with the values.
                 let most = size as u64 + 4;
                 let mut out = Vec::with_capacity(size);
-                let read = flate2::read::ZlibDecoder::new(&data[..]).take(most).read_to_end(&mut out);
+                let read =
+                    flate2::read::ZlibDecoder::new(&data[..]).take(most).read_to_end(&mut out);
                 read.map_err(|e| fault(format!("a chunk cannot be unpacked: {e}"), TRUNCATED))?;
                 out
             }

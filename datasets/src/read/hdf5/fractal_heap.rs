@@ -42,8 +42,12 @@ impl<'s> FractalHeap<'s> {
         f.skip(2)?;
         let root = f.address()?;
         let rows = u64::from(f.u16()?);
-        if !first_block.is_power_of_two() || !largest_direct.is_power_of_two()
-            || largest_direct < first_block || width == 0 || bits > 64 || largest_object == 0
+        if !first_block.is_power_of_two()
+            || !largest_direct.is_power_of_two()
+            || largest_direct < first_block
+            || width == 0
+            || bits > 64
+            || largest_object == 0
         {
             let what = format!("a fractal heap of blocks from {first_block} to {largest_direct}");
             return Err(Fault::new(At::Byte(address), what, BROKEN));

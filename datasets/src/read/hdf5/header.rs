@@ -51,11 +51,7 @@ pub(super) fn messages(source: &Source, address: u64) -> Result<Vec<Message>, Fa
         fields.skip(if flags & 0x10 != 0 { 4 } else { 0 })?;
         let size = fields.uint(1 << (flags & 3))?;
         let prefix = fields.pos as u64;
-        let whole = source.bytes(
-            address,
-            size.saturating_add(prefix + 4),
-            "an object header",
-        )?;
+        let whole = source.bytes(address, size.saturating_add(prefix + 4), "an object header")?;
         verify(&whole, address)?;
         first = Some((whole, prefix as usize));
     } else {

@@ -25,8 +25,8 @@ pub(crate) use datatype::Data;
 mod tests;
 
 use crate::model::Values;
-use crate::read::error::{At, BROKEN, Fault, io_error};
 use crate::read::ReadError;
+use crate::read::error::{At, BROKEN, Fault, io_error};
 use dataset::Stored;
 use datatype::{Dataspace, Datatype};
 use fractal_heap::FractalHeap;

@@ -92,13 +92,16 @@ impl Fields<'_> {
             let kind = self.kind()?;
             let count = self.count()?;
             let bytes = self.padded(count, kind.map_or(1, ScalarType::size), "values")?;
-            out.push((name, match kind {
-                None => {
-                    let text = bytes.iter().copied();
-                    AttributeValue::Text(crate::read::hdf5::from_characters(text))
-                }
-                Some(k) => AttributeValue::Numbers(Values::from_bytes(k, bytes, Endian::Big)),
-            }));
+            out.push((
+                name,
+                match kind {
+                    None => {
+                        let text = bytes.iter().copied();
+                        AttributeValue::Text(crate::read::hdf5::from_characters(text))
+                    }
+                    Some(k) => AttributeValue::Numbers(Values::from_bytes(k, bytes, Endian::Big)),
+                },
+            ));
         }
         Ok(out)
     }

@@ -174,7 +174,8 @@ impl Model<'_> {
         if kept < nodes {
             warnings.push(format!("block {block}: the inner nodes of `{kind}` are left out"));
         }
-        let list: Vec<i64> = self.all(&name)?.iter().flat_map(|v| integers(v).collect::<Vec<_>>()).collect();
+        let list: Vec<i64> =
+            self.all(&name)?.iter().flat_map(|v| integers(v).collect::<Vec<_>>()).collect();
         for cell in list.chunks_exact(nodes) {
             let id = |i: usize| Cells::id(cell[in_order(vtk, i)].saturating_sub(1));
             grid.cells.push((0..kept).map(id));

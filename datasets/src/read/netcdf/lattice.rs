@@ -56,8 +56,8 @@ pub(super) fn dataset(
         }
         let with_time = v.axes.first() == time_axis.as_ref() && time_axis.is_some();
         let space = &v.axes[usize::from(with_time)..];
-        let is_there = space.len() == lattice.axes.len()
-            && lattice.axes.iter().all(|a| space.contains(a));
+        let is_there =
+            space.len() == lattice.axes.len() && lattice.axes.iter().all(|a| space.contains(a));
         if !is_there || !v.is_number {
             left_out.push(format!("`{}`", v.name));
             continue;
@@ -176,7 +176,8 @@ fn lattice(header: &Header, time: Option<usize>) -> Result<Lattice, Fault> {
             .iter()
             .map(|v| format!("`{}` with {} axes", v.name, v.axes.len()))
             .collect();
-        let what = format!("no variable of one to three axes besides the time: {}", list.join(", "));
+        let what =
+            format!("no variable of one to three axes besides the time: {}", list.join(", "));
         let cure = "write one with (time,) z, y, x and a coordinate variable for each";
         return Err(Fault::unsupported(At::Field("the variables".into()), what, cure));
     };
@@ -203,7 +204,9 @@ fn lattice(header: &Header, time: Option<usize>) -> Result<Lattice, Fault> {
     let mut dims = [1usize; 3];
     for (d, &axis) in dims.iter_mut().zip(&axes) {
         let length = header.dimensions[axis].length;
-        *d = usize::try_from(length).ok().filter(|&l| (1..=i32::MAX as usize).contains(&l))
+        *d = usize::try_from(length)
+            .ok()
+            .filter(|&l| (1..=i32::MAX as usize).contains(&l))
             .ok_or_else(|| {
                 let at = format!("dimension `{}`", header.dimensions[axis].name);
                 Fault::field(at, format!("{length} points; a lattice has 1 to 2^31-1"))
@@ -237,7 +240,8 @@ fn reordered(values: Values, space: &[usize], lattice: &Lattice) -> Values {
     if space.iter().rev().eq(lattice.axes.iter()) {
         return values;
     }
-    let length = |axis: usize| lattice.axes.iter().position(|&a| a == axis).map_or(1, |i| lattice.dims[i]);
+    let length =
+        |axis: usize| lattice.axes.iter().position(|&a| a == axis).map_or(1, |i| lattice.dims[i]);
     let mut stride = [0usize; 3];
     let mut step = 1;
     for &axis in space.iter().rev() {
@@ -247,9 +251,8 @@ fn reordered(values: Values, space: &[usize], lattice: &Lattice) -> Values {
         step *= length(axis);
     }
     let [nx, ny, nz] = lattice.dims;
-    let places = (0..nx * ny * nz).map(|i| {
-        i % nx * stride[0] + i / nx % ny * stride[1] + i / (nx * ny) * stride[2]
-    });
+    let places = (0..nx * ny * nz)
+        .map(|i| i % nx * stride[0] + i / nx % ny * stride[1] + i / (nx * ny) * stride[2]);
     values.gathered(places)
 }
 
@@ -262,7 +265,9 @@ fn unpacked(v: &Variable, values: Values, warnings: &mut Vec<String>) -> Result<
         missing.push(NEVER_WRITTEN);
     }
     let is_missing = |x: f64| {
-        missing.iter().any(|&m| x == m || (is_float && (x - m).abs() <= 1e-6 * m.abs() && m.abs() > 1e30))
+        missing
+            .iter()
+            .any(|&m| x == m || (is_float && (x - m).abs() <= 1e-6 * m.abs() && m.abs() > 1e30))
     };
     let (scale, offset) = (v.number("scale_factor"), v.number("add_offset"));
     let si = v.text("units").and_then(to_si);
@@ -321,10 +326,12 @@ fn placed(
         };
         let v = &header.variables[c];
         let values = file.values(c, &[0], &[d.length])?;
-        let mut scale = (v.number("scale_factor").unwrap_or(1.0), v.number("add_offset").unwrap_or(0.0));
+        let mut scale =
+            (v.number("scale_factor").unwrap_or(1.0), v.number("add_offset").unwrap_or(0.0));
         match v.text("units") {
             Some(unit) if unit.starts_with("degree") => warnings.push(format!(
-                "coordinate `{}` is in {unit}: its numbers are taken as lengths", v.name
+                "coordinate `{}` is in {unit}: its numbers are taken as lengths",
+                v.name
             )),
             Some(unit) => {
                 if let Some(si) = to_si(unit).filter(|si| si.unit == "m") {

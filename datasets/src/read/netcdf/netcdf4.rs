@@ -2,7 +2,7 @@
 
 use super::{AttributeValue, Container, Dimension, Header, Variable};
 use crate::model::Values;
-use crate::read::error::{BROKEN, At, Fault};
+use crate::read::error::{At, BROKEN, Fault};
 use crate::read::hdf5::{Data, Hdf5File, Object};
 
 /// Whether an HDF5 file has dimension scales, or says that it is NetCDF.
@@ -32,8 +32,14 @@ pub(super) struct Netcdf4File {
 
 /// Attributes that only keep the file together.
 const INNER: [&str; 8] = [
-    "CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST", "_Netcdf4Dimid", "_Netcdf4Coordinates",
-    "_NCProperties", "DIMENSION_LABELS",
+    "CLASS",
+    "NAME",
+    "REFERENCE_LIST",
+    "DIMENSION_LIST",
+    "_Netcdf4Dimid",
+    "_Netcdf4Coordinates",
+    "_NCProperties",
+    "DIMENSION_LABELS",
 ];
 
 impl Netcdf4File {

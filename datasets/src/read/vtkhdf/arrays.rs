@@ -22,7 +22,12 @@ impl Section {
     }
 }
 
-fn push(what: Section, object: &Object<'_>, array: DataArray, out: &mut Attributes) -> Result<(), Fault> {
+fn push(
+    what: Section,
+    object: &Object<'_>,
+    array: DataArray,
+    out: &mut Attributes,
+) -> Result<(), Fault> {
     let name = array.name.clone();
     let marked = object.text("Attribute")?;
     let list = match what {
@@ -42,7 +47,11 @@ fn push(what: Section, object: &Object<'_>, array: DataArray, out: &mut Attribut
 }
 
 /// Texts and other arrays without numbers are named and left out.
-fn numbers(object: &Object<'_>, data: Data, warnings: &mut Vec<String>) -> Option<crate::model::Values> {
+fn numbers(
+    object: &Object<'_>,
+    data: Data,
+    warnings: &mut Vec<String>,
+) -> Option<crate::model::Values> {
     let found = match data {
         Data::Numbers(v) => return Some(v),
         Data::Texts(_) => "texts".to_string(),

@@ -156,9 +156,7 @@ pub(super) fn poly_data(
         let kind = group.get(name)?;
         let spans = parts.spans(&kind, "NumberOfCells")?;
         let ids = parts.spans(&kind, "NumberOfConnectivityIds")?;
-        let start = |name: &str| {
-            Ok::<u64, Fault>(step.offset(name, column as u64)?.unwrap_or(0))
-        };
+        let start = |name: &str| Ok::<u64, Fault>(step.offset(name, column as u64)?.unwrap_or(0));
         let starts = [start("CellOffsets")?, start("ConnectivityIdOffsets")?];
         cell_start = cell_start.saturating_add(starts[0]);
         kinds.push((kind, spans, ids, starts));
@@ -182,7 +180,14 @@ pub(super) fn poly_data(
         let mut next = read.into_iter();
         let mut take = || next.next().unwrap_or_default();
         let (verts, lines, polys, strips) = (take(), take(), take(), take());
-        pieces.push(Dataset::PolyData(PolyData { points, verts, lines, polys, strips, attributes }));
+        pieces.push(Dataset::PolyData(PolyData {
+            points,
+            verts,
+            lines,
+            polys,
+            strips,
+            attributes,
+        }));
     }
     if pieces.is_empty() {
         return Ok(Dataset::PolyData(PolyData::default()));

@@ -40,7 +40,7 @@ impl Step<'_> {
 }
 
 fn unsigned(value: f64, path: &str) -> Result<u64, Fault> {
-    if value >= 0.0 && value < 9e15 && value.fract() == 0.0 {
+    if (0.0..9e15).contains(&value) && value.fract() == 0.0 {
         return Ok(value as u64);
     }
     Err(Fault::field(format!("`{path}`"), format!("{value} is no count")))

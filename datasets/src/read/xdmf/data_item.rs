@@ -31,7 +31,11 @@ impl<'p> Items<'p> {
     pub(super) fn values(&self, item: Node<'_, '_>) -> Result<Values, Fault> {
         let kind = item.attribute("ItemType").unwrap_or("Uniform").to_ascii_lowercase();
         if item.has_attribute("Reference") {
-            return Err(refused(item, "a reference to another item", "write the item in its place"));
+            return Err(refused(
+                item,
+                "a reference to another item",
+                "write the item in its place",
+            ));
         }
         match kind.as_str() {
             "uniform" => {}
@@ -95,11 +99,13 @@ impl<'p> Items<'p> {
         };
         let slab = self.values(slab)?;
         let rank = slab.len() / 3;
-        let row = |n: usize| (0..rank).map(|a| slab.get_f64(n * rank + a) as u64).collect::<Vec<_>>();
+        let row =
+            |n: usize| (0..rank).map(|a| slab.get_f64(n * rank + a) as u64).collect::<Vec<_>>();
         let (start, stride, count) = (row(0), row(1), row(2));
         let is_hdf = source.attribute("Format").is_some_and(|f| f.eq_ignore_ascii_case("HDF"));
         if !is_hdf || stride.iter().any(|&s| s != 1) {
-            let what = format!("a HyperSlab with strides {stride:?} of {:?}", source.attribute("Format"));
+            let what =
+                format!("a HyperSlab with strides {stride:?} of {:?}", source.attribute("Format"));
             return Err(refused(item, &what, "use strides of 1 of an HDF item"));
         }
         let text = source.text().unwrap_or("").trim();

@@ -23,7 +23,7 @@ fn refused(node: Node<'_, '_>, kind: &str, cure: &str) -> Fault {
 pub(super) fn points(items: &Items<'_>, node: Node<'_, '_>) -> Result<Points, Fault> {
     let values = all(items, node)?;
     let flat = |v: &Values| -> Result<Points, Fault> {
-        if v.len() % 2 != 0 {
+        if !v.len().is_multiple_of(2) {
             return Err(fault(node, format!("{} coordinates of points in a plane", v.len())));
         }
         let points = (0..v.len() / 2).map(|i| [v.get_f64(2 * i), v.get_f64(2 * i + 1), 0.0]);
@@ -31,7 +31,7 @@ pub(super) fn points(items: &Items<'_>, node: Node<'_, '_>) -> Result<Points, Fa
     };
     match (kind(node).as_str(), &values[..]) {
         ("XYZ", [xyz]) => {
-            if xyz.len() % 3 != 0 {
+            if !xyz.len().is_multiple_of(3) {
                 return Err(fault(node, format!("{} coordinates of points in space", xyz.len())));
             }
             Ok(Points::from_array(DataArray::new("Points", 3, xyz.clone()))?)

@@ -136,9 +136,8 @@ impl File<'_> {
             return Err(Fault::unsupported(place(grid), format!("GridType `{kind}`"), cure));
         }
         let children: Vec<Node<'_, '_>> = grid.children().filter(|n| is(*n, "Grid")).collect();
-        let is_temporal = grid
-            .attribute("CollectionType")
-            .is_some_and(|t| t.eq_ignore_ascii_case("Temporal"));
+        let is_temporal =
+            grid.attribute("CollectionType").is_some_and(|t| t.eq_ignore_ascii_case("Temporal"));
         if is_temporal && !children.is_empty() {
             let times = self.times(grid, &children)?;
             let mut order: Vec<usize> = (0..times.len()).collect();
@@ -187,9 +186,10 @@ impl File<'_> {
         for (i, g) in grids.iter().enumerate() {
             let time = g.descendants().find(|n| is(*n, "Time"));
             out.push(match time.and_then(|t| t.attribute("Value")) {
-                Some(text) => text.trim().parse().map_err(|_| {
-                    fault(*g, format!("the time `{text}` is not a number"))
-                })?,
+                Some(text) => text
+                    .trim()
+                    .parse()
+                    .map_err(|_| fault(*g, format!("the time `{text}` is not a number")))?,
                 None => i as f64,
             });
         }
@@ -244,7 +244,8 @@ impl File<'_> {
                 "cell" => (&mut out.cell, cells),
                 "grid" => (&mut out.field, 1),
                 other => {
-                    self.warnings.push(format!("attribute `{name}` left out: its center is {other}"));
+                    self.warnings
+                        .push(format!("attribute `{name}` left out: its center is {other}"));
                     continue;
                 }
             };

@@ -73,11 +73,13 @@ pub(super) fn cells(
     let mut grid = UnstructuredGrid { points, ..Default::default() };
     let count = grid.points.len() as u64;
     if name == "polyvertex" && child(node, "DataItem").is_none() {
-        grid.cells = Cells::uniform(1, (0..grid.points.len()).map(|i| Cells::id(i as i64)).collect());
+        grid.cells =
+            Cells::uniform(1, (0..grid.points.len()).map(|i| Cells::id(i as i64)).collect());
         grid.types = vec![1; grid.points.len()];
         return Ok(Dataset::UnstructuredGrid(grid));
     }
-    let list: Vec<i64> = all(items, node)?.iter().flat_map(|v| integers(v).collect::<Vec<_>>()).collect();
+    let list: Vec<i64> =
+        all(items, node)?.iter().flat_map(|v| integers(v).collect::<Vec<_>>()).collect();
     if name == "mixed" {
         mixed(node, &list, &mut grid)?;
     } else {
@@ -95,7 +97,7 @@ pub(super) fn cells(
                 (points.ok_or_else(none)?, chain.2)
             }
         };
-        if list.len() % points != 0 {
+        if !list.len().is_multiple_of(points) {
             return Err(fault(node, format!("{} ids for cells of {points} points", list.len())));
         }
         grid.cells = Cells::uniform(points, list.into_iter().map(Cells::id).collect());
