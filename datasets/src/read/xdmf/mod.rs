@@ -1,8 +1,8 @@
 //! XDMF (`.xdmf`, `.xmf`): XML that describes grids whose values are in HDF5, in binary files or in
 //! the XML itself.
 //!
-//! Uniform, rectilinear, curvilinear and unstructured grids; spatial collections as blocks, temporal
-//! collections as times. Functions, subsets and references are refused by name.
+//! Uniform, rectilinear, curvilinear and unstructured grids; spatial collections as blocks,
+//! temporal collections as times. Functions, subsets and references are refused by name.
 //!
 //! Source: "XDMF Model and Format" (xdmf.org), and what meshio 5.3 and VTK 9.7 write.
 
