@@ -6,14 +6,14 @@ use datasets::read::OpenOptions;
 /// What the file does not say itself, or which of its times is meant.
 #[derive(Debug, Clone, Args)]
 pub(super) struct OpenArgs {
-    /// The time to read from a series or an OpenFOAM case [default: the first of a series, the last
-    /// of a case]
+    /// The time to read from a series, a file with several times or an OpenFOAM case [default: the
+    /// first of a series or file, the last of a case]
     #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
     time: Option<f64>,
-    /// Distance between the points of a NumPy array
+    /// Distance between the points of a NumPy array, or of a NetCDF file without coordinates
     #[arg(long, value_name = "DX,DY,DZ", value_parser = three)]
     spacing: Option<[f64; 3]>,
-    /// Position of the first point of a NumPy array
+    /// Position of the first point of a NumPy array, or of a NetCDF file without coordinates
     #[arg(long, value_name = "X,Y,Z", value_parser = three, allow_hyphen_values = true)]
     origin: Option<[f64; 3]>,
 }

@@ -1,16 +1,17 @@
 //! Detects the format of a file by its first bytes, or else by the extension of its name.
 
-use super::error::{io_error, read_bytes};
+use super::error::{Fault, io_error, read_bytes};
 use super::{
-    LoadedFile, OpenOptions, ReadError, gltf, mhd, npy, nrrd, obj, openfoam, plot3d, ply, raw, stl,
-    vtk_legacy, vtk_xml,
+    LoadedFile, OpenOptions, ReadError, gltf, hdf5, mhd, netcdf, npy, nrrd, obj, openfoam, plot3d,
+    ply, raw, stl, time_axis, vtk_legacy, vtk_xml, vtkhdf, xdmf,
 };
 use std::io::Read;
 use std::path::Path;
 
 /// The supported formats, for messages.
 pub const KNOWN: &str = "VTK XML (.vti .vtp .vtu .vtr .vts, their parallel forms, .pvd, .vtm, .series), VTK \
-                         legacy (.vtk), \
+                         legacy (.vtk), VTKHDF (.vtkhdf), NetCDF (.nc), Exodus II (.e .exo), \
+                         XDMF (.xdmf .xmf), \
                          PLOT3D (.xyz .x .g .q .bin), NRRD (.nrrd .nhdr), MetaImage (.mhd .mha), \
                          raw with TOML (.raw), NumPy (.npy .npz), OpenFOAM cases (folders, .foam), OBJ, glTF, PLY, STL";
 
@@ -22,6 +23,9 @@ enum Format {
     VtkXml,
     VtkSeries,
     VtkLegacy,
+    VtkHdf,
+    NetCdf,
+    Xdmf,
     Plot3d,
     Nrrd,
     MetaImage,
@@ -40,6 +44,9 @@ impl Format {
             Format::VtkXml => vtk_xml::FORMAT,
             Format::VtkSeries => vtk_xml::series::FORMAT,
             Format::VtkLegacy => vtk_legacy::FORMAT,
+            Format::VtkHdf => vtkhdf::FORMAT,
+            Format::NetCdf => netcdf::FORMAT,
+            Format::Xdmf => xdmf::FORMAT,
             Format::Plot3d => plot3d::FORMAT,
             Format::Nrrd => nrrd::FORMAT,
             Format::MetaImage => mhd::FORMAT,
@@ -80,12 +87,20 @@ pub fn open_with(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Loaded
     if openfoam::is_case(path) || path.is_dir() {
         return openfoam::read(path, options);
     }
+    if let Some((file, time)) = time_axis::time_of_file(path) {
+        options.refuse_time().map_err(|f| f.in_file(path, "series"))?;
+        return open_with(file, &OpenOptions { time: Some(time), ..*options });
+    }
     let mut head = Vec::new();
     let file = std::fs::File::open(path).map_err(|e| io_error(path, e))?;
     let length = file.metadata().map_err(|e| io_error(path, e))?.len();
     file.take(HEAD_BYTES).read_to_end(&mut head).map_err(|e| io_error(path, e))?;
 
-    let by_content = from_content(&head, length);
+    let by_content = match head.starts_with(hdf5::MAGIC) || head.get(512..520) == Some(hdf5::MAGIC)
+    {
+        true => Some(from_hdf5(path)?),
+        false => from_content(&head, length),
+    };
     let by_name = from_name(path);
     let format = match (by_content, by_name) {
         (Some(f), _) | (None, Some(f)) => f,
@@ -98,16 +113,22 @@ pub fn open_with(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Loaded
             }
         }
     };
-    if format != Format::Numpy {
+    if !matches!(format, Format::Numpy | Format::NetCdf) {
         options.refuse_lattice().map_err(|f| f.in_file(path, format.name()))?;
     }
-    if !matches!(format, Format::VtkXml | Format::VtkSeries | Format::Numpy) {
+    let has_times = [Format::VtkXml, Format::VtkSeries, Format::Numpy, Format::VtkHdf]
+        .contains(&format)
+        || [Format::NetCdf, Format::Xdmf].contains(&format);
+    if !has_times {
         options.refuse_time().map_err(|f| f.in_file(path, format.name()))?;
     }
     let mut opened = match format {
         Format::VtkXml => vtk_xml::read_at(path, options.time),
         Format::VtkSeries => vtk_xml::series::read(path, options.time),
         Format::VtkLegacy => vtk_legacy::read(path),
+        Format::VtkHdf => vtkhdf::read(path, options),
+        Format::NetCdf => netcdf::read(path, options),
+        Format::Xdmf => xdmf::read(path, options),
         Format::Plot3d => plot3d::read(path, &plot3d::Plot3dOptions::default()),
         Format::Nrrd => nrrd::read(path),
         Format::MetaImage => mhd::read(path),
@@ -118,8 +139,10 @@ pub fn open_with(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Loaded
         Format::Ply => ply::read(path),
         Format::Stl => stl::read(path),
     }?;
+    // `.g` is PLOT3D's and Exodus II's.
     if let (Some(content), Some(name)) = (by_content, by_name)
         && content != name
+        && content != Format::NetCdf
     {
         opened.warnings.push(format!("the name says {name:?}, the content is {}", opened.format));
     }
@@ -133,8 +156,12 @@ fn from_content(head: &[u8], length: u64) -> Option<Format> {
         Some(Format::VtkLegacy)
     } else if text.starts_with(b"<") && contains(b"<VTKFile") {
         Some(Format::VtkXml)
+    } else if text.starts_with(b"<") && (contains(b"<Xdmf") || contains(b"<xdmf")) {
+        Some(Format::Xdmf)
     } else if text.starts_with(b"{") && contains(b"\"file-series-version\"") {
         Some(Format::VtkSeries)
+    } else if head.starts_with(b"CDF") && head.get(3).is_some_and(|v| [1, 2, 5].contains(v)) {
+        Some(Format::NetCdf)
     } else if head.starts_with(npy::MAGIC) {
         Some(Format::Numpy)
     } else if text.starts_with(b"NRRD000") {
@@ -153,6 +180,31 @@ fn from_content(head: &[u8], length: u64) -> Option<Format> {
     }
 }
 
+/// What an HDF5 file holds, by the names in it.
+fn from_hdf5(path: &Path) -> Result<Format, ReadError> {
+    let file = hdf5::Hdf5File::open(path, hdf5::FORMAT)?;
+    let mut is_cgns = false;
+    let mut of_names = || {
+        let names = file.root()?.names()?;
+        is_cgns = names.iter().any(|n| n == "CGNSLibraryVersion");
+        if names.iter().any(|n| n == vtkhdf::ROOT) {
+            return Ok(Some(Format::VtkHdf));
+        }
+        Ok(netcdf::is_netcdf4(&file)?.then_some(Format::NetCdf))
+    };
+    let found = of_names().map_err(|f: Fault| f.in_file(path, hdf5::FORMAT))?;
+    found.ok_or_else(|| {
+        let what = match is_cgns {
+            true => "a CGNS file: open it in ParaView and save it as .vtu or .vtm",
+            false => {
+                "an HDF5 file that is neither VTKHDF nor NetCDF-4: describe it with an .xdmf file, \
+                 or save it as .vtu with ParaView"
+            }
+        };
+        ReadError::UnknownFormat { path: path.to_path_buf(), what: what.into(), known: KNOWN }
+    })
+}
+
 /// True if the number of triangles in the header of a binary STL file matches its length.
 fn stl_size(head: &[u8], length: u64) -> bool {
     let n = head.get(80..84).and_then(|b| b.try_into().ok()).map(u32::from_le_bytes);
@@ -166,6 +218,9 @@ fn from_name(path: &Path) -> Option<Format> {
         | "pvd" | "vtm" => Format::VtkXml,
         "series" => Format::VtkSeries,
         "vtk" => Format::VtkLegacy,
+        "xdmf" | "xmf" | "xdmf2" | "xdmf3" => Format::Xdmf,
+        "vtkhdf" => Format::VtkHdf,
+        "nc" | "nc4" | "cdf" | "e" | "exo" | "ex2" | "exii" => Format::NetCdf,
         "xyz" | "x" | "g" | "grid" | "p3d" | "q" | "sol" => Format::Plot3d,
         "nrrd" | "nhdr" => Format::Nrrd,
         "mhd" | "mha" => Format::MetaImage,
@@ -184,10 +239,6 @@ fn unknown(path: &Path, head: &[u8]) -> ReadError {
         path.extension().map_or_else(|| "none".into(), |e| format!(".{}", e.to_string_lossy()));
     let what = if head.is_empty() {
         "the file is empty".to_string()
-    } else if head.starts_with(b"\x89HDF") || head.starts_with(b"CDF") {
-        "it is an HDF5 or netCDF file, perhaps Exodus or CGNS: save it as .vtu or .vti with \
-         ParaView"
-            .to_string()
     } else {
         let shown: String = head.iter().take(8).map(|b| format!("{b:02x}")).collect();
         format!("ending {extension}, first bytes {shown}")

@@ -7,12 +7,13 @@ use super::error::{At, Fault};
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct OpenOptions {
     /// The time to read from a file or folder with several, in the unit of the program that wrote
-    /// it. Without it, the first time of a collection and the last one of an OpenFOAM case are
-    /// read.
+    /// it. Without it, the first time of a collection or file and the last one of an OpenFOAM case
+    /// are read.
     pub time: Option<f64>,
-    /// Distance between points along x, y and z, for NumPy arrays.
+    /// Distance between points along x, y and z, for NumPy arrays and NetCDF files without
+    /// coordinates.
     pub spacing: Option<[f64; 3]>,
-    /// Position of the first point, for NumPy arrays.
+    /// Position of the first point, for NumPy arrays and NetCDF files without coordinates.
     pub origin: Option<[f64; 3]>,
 }
 

@@ -407,6 +407,22 @@ pub(crate) fn glb() -> Vec<u8> {
 }
 
 /// One small valid file of every format that does not need a second file.
+/// A collection of two times, with every kind of lattice and a mixed topology.
+const XDMF: &str = r#"<?xml version="1.0" ?><!DOCTYPE Xdmf SYSTEM "Xdmf.dtd" []>
+<Xdmf><Domain><Grid GridType="Collection" CollectionType="Temporal"><Time TimeType="List">
+<DataItem Dimensions="2" Format="XML">0.5 1</DataItem></Time>
+<Grid GridType="Collection" Name="all"><Grid Name="uniform">
+<Topology TopologyType="3DCoRectMesh" Dimensions="2 2 3"/><Geometry GeometryType="ORIGIN_DXDYDZ">
+<DataItem Dimensions="3">0 0 1</DataItem><DataItem Dimensions="3">1 2 3</DataItem></Geometry>
+<Attribute Name="p"><DataItem Dimensions="2 2 3">0 1 2 3 4 5 6 7 8 9 10 11</DataItem></Attribute>
+<Attribute Name="c" Center="Cell"><DataItem Dimensions="2" NumberType="Int">7 8</DataItem>
+</Attribute></Grid><Grid Name="rectilinear"><Topology TopologyType="2DRectMesh" Dimensions="2 3"/>
+<Geometry GeometryType="VXVY"><DataItem Dimensions="3">0 1 4</DataItem><DataItem Dimensions="2">0 1
+</DataItem></Geometry></Grid><Grid Name="mixed"><Topology TopologyType="Mixed"><DataItem
+Dimensions="10" NumberType="Int" Precision="8">6 0 1 2 3 3 3 1 2 3</DataItem></Topology>
+<Geometry GeometryType="XYZ"><DataItem Dimensions="4 3" Precision="8">0 0 0 1 0 0 0 1 0 0 0 1
+</DataItem></Geometry></Grid></Grid><Grid/></Grid></Domain></Xdmf>"#;
+
 pub(crate) fn all() -> Vec<Sample> {
     let mut list = vtk_xml();
     list.extend([
@@ -426,6 +442,14 @@ pub(crate) fn all() -> Vec<Sample> {
         ("a.obj", OBJ.into()),
         ("a.gltf", gltf()),
         ("a.glb", glb()),
+        ("a.vtkhdf", include_bytes!("../files/image.vtkhdf").to_vec()),
+        ("b.vtkhdf", include_bytes!("../files/times.vtkhdf").to_vec()),
+        ("a.nc", include_bytes!("../files/classic.nc").to_vec()),
+        ("b.nc", include_bytes!("../files/data.nc").to_vec()),
+        ("a.exo", include_bytes!("../files/offset.exo").to_vec()),
+        ("b.exo", include_bytes!("../files/netcdf4.exo").to_vec()),
+        ("a.xmf", XDMF.into()),
+        ("c.nc", include_bytes!("../files/netcdf4.nc").to_vec()),
     ]);
     for (name, records, big) in [("a.xyz", false, true), ("b.xyz", true, false)] {
         list.push((name, plot3d(&[[3, 2, 2], [2, 2, 2]], true, records, big, true).0));

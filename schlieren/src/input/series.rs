@@ -1,4 +1,5 @@
-//! Lists the times of a flow: of a collection, a file series, an OpenFOAM case or a list of files.
+//! Lists the times of a flow: of a collection, a file series, a file with several times, an OpenFOAM
+//! case or a list of files.
 
 use super::InputError;
 use std::path::{Path, PathBuf};
@@ -12,8 +13,8 @@ pub struct Step {
     pub path: PathBuf,
 }
 
-/// Lists the times of a series: those of a single PVD file, file series (`.vtu.series`) or OpenFOAM
-/// case, or one per file in the given order.
+/// Lists the times of a series: those of a single PVD file, file series (`.vtu.series`), VTKHDF or
+/// NetCDF file or OpenFOAM case, or one per file in the given order.
 ///
 /// Comparing them requires the same reference: load the first, then pass its
 /// [`super::Report::reference_n_minus_1`] as [`super::Reference::Given`] to the others.
@@ -35,7 +36,7 @@ pub fn series(paths: &[PathBuf]) -> Result<Vec<Step>, InputError> {
             });
         }
         if opened.time_steps.is_empty() {
-            // A case with a mesh alone.
+            // A case with a mesh alone, or a file without times.
             return Ok(vec![Step { time: 0.0, path: only.clone() }]);
         }
         return Ok(opened
@@ -49,7 +50,7 @@ pub fn series(paths: &[PathBuf]) -> Result<Vec<Step>, InputError> {
 
 /// Whether a path may be that of several times, by its name or as a case of OpenFOAM.
 fn has_times(path: &Path) -> bool {
-    let lists = ["pvd", "series"];
+    let lists = ["pvd", "series", "vtkhdf", "hdf", "nc", "nc4", "cdf"];
     path.extension().is_some_and(|e| lists.iter().any(|l| e.eq_ignore_ascii_case(l)))
         || datasets::read::openfoam::is_whole_case(path)
 }
