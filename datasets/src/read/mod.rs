@@ -22,6 +22,7 @@ pub mod ply;
 pub mod raw;
 pub mod scene;
 pub mod stl;
+mod tecplot;
 pub(crate) mod volume;
 pub mod vtk_legacy;
 pub mod vtk_xml;
@@ -45,7 +46,8 @@ pub struct LoadedFile {
     /// What was left out or repaired, one sentence each; empty if nothing was.
     pub warnings: Vec<String>,
     /// For a time series or a case: every time with its path, in order. `content` holds one of them
-    /// ([`OpenOptions::time`]); open the others by their path.
+    /// ([`OpenOptions::time`]); open the others by their path, or, if it is
+    /// that of the file itself, by their time.
     pub time_steps: Vec<TimeStep>,
 }
 

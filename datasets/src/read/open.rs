@@ -3,7 +3,7 @@
 use super::error::{io_error, read_bytes};
 use super::{
     LoadedFile, OpenOptions, ReadError, gltf, mhd, npy, nrrd, obj, openfoam, plot3d, ply, raw, stl,
-    vtk_legacy, vtk_xml,
+    tecplot, vtk_legacy, vtk_xml,
 };
 use std::io::Read;
 use std::path::Path;
@@ -12,7 +12,8 @@ use std::path::Path;
 pub const KNOWN: &str = "VTK XML (.vti .vtp .vtu .vtr .vts, their parallel forms, .pvd, .vtm, .series), VTK \
                          legacy (.vtk), \
                          PLOT3D (.xyz .x .g .q .bin), NRRD (.nrrd .nhdr), MetaImage (.mhd .mha), \
-                         raw with TOML (.raw), NumPy (.npy .npz), OpenFOAM cases (folders, .foam), OBJ, glTF, PLY, STL";
+                         raw with TOML (.raw), NumPy (.npy .npz), OpenFOAM cases (folders, .foam), \
+                         Tecplot (.dat .tec .plt), OBJ, glTF, PLY, STL";
 
 /// Number of bytes examined.
 const HEAD_BYTES: u64 = 1024;
@@ -31,9 +32,16 @@ enum Format {
     Gltf,
     Ply,
     Stl,
+    Tecplot,
 }
 
 impl Format {
+    /// Whether a file may hold several times.
+    fn may_have_times(self) -> bool {
+        use Format::*;
+        matches!(self, VtkXml | VtkSeries | Numpy | Tecplot)
+    }
+
     /// Its name, for messages.
     fn name(self) -> &'static str {
         match self {
@@ -49,6 +57,7 @@ impl Format {
             Format::Gltf => gltf::FORMAT,
             Format::Ply => ply::FORMAT,
             Format::Stl => stl::FORMAT,
+            Format::Tecplot => tecplot::FORMAT,
         }
     }
 }
@@ -101,7 +110,7 @@ pub fn open_with(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Loaded
     if format != Format::Numpy {
         options.refuse_lattice().map_err(|f| f.in_file(path, format.name()))?;
     }
-    if !matches!(format, Format::VtkXml | Format::VtkSeries | Format::Numpy) {
+    if !format.may_have_times() {
         options.refuse_time().map_err(|f| f.in_file(path, format.name()))?;
     }
     let mut opened = match format {
@@ -117,6 +126,7 @@ pub fn open_with(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Loaded
         Format::Gltf => gltf::read(path),
         Format::Ply => ply::read(path),
         Format::Stl => stl::read(path),
+        Format::Tecplot => tecplot::read(path, options),
     }?;
     if let (Some(content), Some(name)) = (by_content, by_name)
         && content != name
@@ -137,6 +147,8 @@ fn from_content(head: &[u8], length: u64) -> Option<Format> {
         Some(Format::VtkSeries)
     } else if head.starts_with(npy::MAGIC) {
         Some(Format::Numpy)
+    } else if tecplot::begins_as_tecplot(text) {
+        Some(Format::Tecplot)
     } else if text.starts_with(b"NRRD000") {
         Some(Format::Nrrd)
     } else if text.starts_with(b"ply\n") || text.starts_with(b"ply\r") {
@@ -175,6 +187,7 @@ fn from_name(path: &Path) -> Option<Format> {
         "gltf" | "glb" => Format::Gltf,
         "ply" => Format::Ply,
         "stl" => Format::Stl,
+        "tec" | "plt" => Format::Tecplot,
         _ => return None,
     })
 }
