@@ -7,6 +7,7 @@
 pub(crate) mod base64;
 pub mod csv;
 pub mod csv_lattice;
+mod ensight;
 pub mod error;
 pub mod gltf;
 pub mod mhd;

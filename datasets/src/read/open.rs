@@ -2,8 +2,8 @@
 
 use super::error::{io_error, read_bytes};
 use super::{
-    LoadedFile, OpenOptions, ReadError, gltf, mhd, npy, nrrd, obj, openfoam, plot3d, ply, raw, stl,
-    tecplot, vtk_legacy, vtk_xml,
+    LoadedFile, OpenOptions, ReadError, ensight, gltf, mhd, npy, nrrd, obj, openfoam, plot3d, ply,
+    raw, stl, tecplot, vtk_legacy, vtk_xml,
 };
 use std::io::Read;
 use std::path::Path;
@@ -13,7 +13,7 @@ pub const KNOWN: &str = "VTK XML (.vti .vtp .vtu .vtr .vts, their parallel forms
                          legacy (.vtk), \
                          PLOT3D (.xyz .x .g .q .bin), NRRD (.nrrd .nhdr), MetaImage (.mhd .mha), \
                          raw with TOML (.raw), NumPy (.npy .npz), OpenFOAM cases (folders, .foam), \
-                         Tecplot (.dat .tec .plt), OBJ, glTF, PLY, STL";
+                         Tecplot (.dat .tec .plt), EnSight Gold (.case), OBJ, glTF, PLY, STL";
 
 /// Number of bytes examined.
 const HEAD_BYTES: u64 = 1024;
@@ -33,13 +33,14 @@ enum Format {
     Ply,
     Stl,
     Tecplot,
+    EnSight,
 }
 
 impl Format {
     /// Whether a file may hold several times.
     fn may_have_times(self) -> bool {
         use Format::*;
-        matches!(self, VtkXml | VtkSeries | Numpy | Tecplot)
+        matches!(self, VtkXml | VtkSeries | Numpy | Tecplot | EnSight)
     }
 
     /// Its name, for messages.
@@ -58,6 +59,7 @@ impl Format {
             Format::Ply => ply::FORMAT,
             Format::Stl => stl::FORMAT,
             Format::Tecplot => tecplot::FORMAT,
+            Format::EnSight => ensight::FORMAT,
         }
     }
 }
@@ -127,6 +129,7 @@ pub fn open_with(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Loaded
         Format::Ply => ply::read(path),
         Format::Stl => stl::read(path),
         Format::Tecplot => tecplot::read(path, options),
+        Format::EnSight => ensight::read(path, options),
     }?;
     if let (Some(content), Some(name)) = (by_content, by_name)
         && content != name
@@ -149,6 +152,8 @@ fn from_content(head: &[u8], length: u64) -> Option<Format> {
         Some(Format::Numpy)
     } else if tecplot::begins_as_tecplot(text) {
         Some(Format::Tecplot)
+    } else if ensight::begins_as_case(text) {
+        Some(Format::EnSight)
     } else if text.starts_with(b"NRRD000") {
         Some(Format::Nrrd)
     } else if text.starts_with(b"ply\n") || text.starts_with(b"ply\r") {
@@ -188,6 +193,7 @@ fn from_name(path: &Path) -> Option<Format> {
         "ply" => Format::Ply,
         "stl" => Format::Stl,
         "tec" | "plt" => Format::Tecplot,
+        "case" | "encas" => Format::EnSight,
         _ => return None,
     })
 }
