@@ -5,8 +5,8 @@ mod sample_files;
 
 use datasets::read::{Content, LoadedFile, ReadError, open};
 use proptest::prelude::*;
-use sample_files::ensight;
 use sample_files::openfoam::{Form, case, decomposed, write};
+use sample_files::{amrex, ensight};
 use std::path::Path;
 
 /// Reads bytes as a file of this name, and applies all conversions.
@@ -242,6 +242,31 @@ proptest! {
         let dir = tempfile::tempdir().unwrap();
         ensight::write(dir.path(), &files);
         match open(dir.path().join("a.case")) {
+            Ok(opened) => use_all(&opened),
+            Err(e) => prop_assert!(e.to_string().contains("; "), "no cure in: {e}"),
+        }
+        assert_memory_is_bounded();
+    }
+}
+
+proptest! {
+    // Each case writes five files.
+    #![proptest_config(ProptestConfig {
+        cases: cases() / 3,
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    })]
+
+    #[test]
+    fn every_damage_to_a_plotfile_is_survived(
+        damages in prop::collection::vec((any::<prop::sample::Index>(), damage()), 1..4),
+    ) {
+        let mut files = amrex::plotfile();
+        let count = files.len();
+        damages.iter().for_each(|(file, d)| apply(&mut files[file.index(count)].1, d));
+        let dir = tempfile::tempdir().unwrap();
+        amrex::write(dir.path(), &files);
+        match open(dir.path()) {
             Ok(opened) => use_all(&opened),
             Err(e) => prop_assert!(e.to_string().contains("; "), "no cure in: {e}"),
         }

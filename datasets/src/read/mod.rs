@@ -4,6 +4,7 @@
 //! that the bytes of the file can justify; everything left out is named in
 //! [`LoadedFile::warnings`]; every error names the file, the position and the cure.
 
+mod amrex;
 pub(crate) mod base64;
 pub mod csv;
 pub mod csv_lattice;

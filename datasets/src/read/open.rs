@@ -2,8 +2,8 @@
 
 use super::error::{io_error, read_bytes};
 use super::{
-    LoadedFile, OpenOptions, ReadError, ensight, gltf, mhd, npy, nrrd, obj, openfoam, plot3d, ply,
-    raw, stl, tecplot, vtk_legacy, vtk_xml,
+    LoadedFile, OpenOptions, ReadError, amrex, ensight, gltf, mhd, npy, nrrd, obj, openfoam,
+    plot3d, ply, raw, stl, tecplot, vtk_legacy, vtk_xml,
 };
 use std::io::Read;
 use std::path::Path;
@@ -13,7 +13,8 @@ pub const KNOWN: &str = "VTK XML (.vti .vtp .vtu .vtr .vts, their parallel forms
                          legacy (.vtk), \
                          PLOT3D (.xyz .x .g .q .bin), NRRD (.nrrd .nhdr), MetaImage (.mhd .mha), \
                          raw with TOML (.raw), NumPy (.npy .npz), OpenFOAM cases (folders, .foam), \
-                         Tecplot (.dat .tec .plt), EnSight Gold (.case), OBJ, glTF, PLY, STL";
+                         Tecplot (.dat .tec .plt), EnSight Gold (.case), \
+                         AMReX plotfiles (folders), OBJ, glTF, PLY, STL";
 
 /// Number of bytes examined.
 const HEAD_BYTES: u64 = 1024;
@@ -88,6 +89,9 @@ pub fn open(path: impl AsRef<Path>) -> Result<LoadedFile, ReadError> {
 /// Also if an option means nothing to the format of the file.
 pub fn open_with(path: impl AsRef<Path>, options: &OpenOptions) -> Result<LoadedFile, ReadError> {
     let path = path.as_ref();
+    if amrex::header_of(path).is_some() {
+        return amrex::read(path, options);
+    }
     if openfoam::is_case(path) || path.is_dir() {
         return openfoam::read(path, options);
     }

@@ -1,6 +1,7 @@
 //! Small files of every format for the tests of the readers, built byte by byte or by the writers.
 #![allow(dead_code, reason = "each test uses some of them")]
 
+pub(crate) mod amrex;
 pub(crate) mod ensight;
 pub(crate) mod openfoam;
 pub(crate) mod tecplot;

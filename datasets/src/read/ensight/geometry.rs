@@ -142,7 +142,7 @@ fn mesh(
                     let what = format!("elements of type `{}`", short(name));
                     return Err(Fault::unsupported(at, what, cure));
                 };
-                let total = n.checked_mul(corners as u64).unwrap_or(u64::MAX);
+                let total = n.saturating_mul(corners as u64);
                 let ids = indices(s, total, grid.points.len())?;
                 for e in ids.chunks_exact(corners) {
                     let wedge = kind == WEDGE || kind == QUADRATIC_WEDGE;

@@ -110,7 +110,7 @@ fn section(
         true => s.reals(1, "the undefined value")?.first().copied(),
         false => None,
     };
-    let total = n.checked_mul(v.components as u64).unwrap_or(u64::MAX);
+    let total = n.saturating_mul(v.components as u64);
     let mut flat = s.reals(total, &format!("values of `{}`", v.name))?;
     if flat.len() as u64 != total {
         return Err(Fault::new(At::Field(v.name.clone()), "too few values", BROKEN));

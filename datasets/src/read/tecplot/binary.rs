@@ -250,7 +250,7 @@ fn connectivity(
             h.cells_from = Some(earlier.len().saturating_sub(1));
         }
         if h.cells_from.is_none() {
-            let count = elements.checked_mul(kind.corners() as u64).unwrap_or(u64::MAX);
+            let count = elements.saturating_mul(kind.corners() as u64);
             let ids = input.list(count, &format!("corners of elements in zone `{}`", h.title))?;
             let first = i32::from(input.version == 75);
             let mut out = Vec::with_capacity(ids.len());

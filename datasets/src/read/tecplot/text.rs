@@ -155,7 +155,7 @@ fn zone(
         }
     }
     if let (Shape::Elements { kind, points, elements }, None) = (h.shape, h.cells_from) {
-        let ids = elements.checked_mul(kind.corners() as u64).unwrap_or(u64::MAX);
+        let ids = elements.saturating_mul(kind.corners() as u64);
         zone.elements = Some(Rc::new(text_zone::elements(s, h, ids, points)?));
     }
     if face_neighbours {
