@@ -107,7 +107,8 @@ for path in sys.argv[1:]:
     for i in range(2):
         b = out.GetBlock(i)
         cells = [b.GetCell(k) for k in range(b.GetNumberOfCells())]
-        print(b.GetNumberOfPoints(), list(b.GetPoint(5)), [b.GetCellType(k) for k in range(len(cells))])
+        print(b.GetNumberOfPoints(), list(b.GetPoint(5)),
+              [b.GetCellType(k) for k in range(len(cells))])
         for k in range(3):
             ids = b.GetCell(k).GetPointIds() if i == 0 else None
             print(sorted(ids.GetId(p) for p in range(ids.GetNumberOfIds())) if ids else '')

@@ -170,10 +170,11 @@ reader.Update()
 out = reader.GetOutput()
 for i in range(out.GetNumberOfBlocks()):
     b = out.GetBlock(i)
-    data = lambda d, n: [d.GetArray(n).GetTuple1(k) for k in range(d.GetArray(n).GetNumberOfTuples())]
+    data = lambda d, n: [d.GetArray(n).GetTuple1(k)
+        for k in range(d.GetArray(n).GetNumberOfTuples())]
     t = data(b.GetCellData(), 'T') if b.GetCellData().GetArray('T') else data(b.GetPointData(), 'T')
-    types = [b.GetCellType(k) for k in range(b.GetNumberOfCells())]
-    print(b.GetNumberOfPoints(), b.GetNumberOfCells(), list(b.GetPoint(2)), data(b.GetPointData(), 'rho'), t)
+    print(b.GetNumberOfPoints(), b.GetNumberOfCells(), list(b.GetPoint(2)),
+          data(b.GetPointData(), 'rho'), t)
 ";
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("flow.dat");

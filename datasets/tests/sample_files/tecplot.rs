@@ -8,7 +8,8 @@ TITLE = \"a # b\"
 VARIABLES = \"X [m]\", \"Y\"
 \"Z\", \"rho\" \"T\"
 DATASETAUXDATA by = \"us\"
-ZONE T = \"lattice\", I=3, J=2, K = 2, DATAPACKING=BLOCK, VARLOCATION=([5]=CELLCENTERED), DT=(SINGLE)
+ZONE T = \"lattice\", I=3, J=2, K = 2, DATAPACKING=BLOCK, 
+ VARLOCATION=([5]=CELLCENTERED), DT=(SINGLE)
  AUXDATA Note = \"free\" SOLUTIONTIME=1
  0 1 2 0 1 2 0 1 2 0 1 2
  3*0, 3*1.0, 3*0, 3*1
