@@ -6,6 +6,7 @@ mod sample_files;
 use datasets::read::{Content, LoadedFile, ReadError, open};
 use proptest::prelude::*;
 use sample_files::openfoam::{Form, case, decomposed, write};
+use sample_files::{amrex, ensight};
 use std::path::Path;
 
 /// Reads bytes as a file of this name, and applies all conversions.
@@ -214,6 +215,57 @@ proptest! {
         damages.iter().for_each(|(file, d)| apply(&mut files[file.index(count)].1, d));
         let dir = tempfile::tempdir().unwrap();
         write(dir.path(), &files);
+        match open(dir.path()) {
+            Ok(opened) => use_all(&opened),
+            Err(e) => prop_assert!(e.to_string().contains("; "), "no cure in: {e}"),
+        }
+        assert_memory_is_bounded();
+    }
+}
+
+proptest! {
+    // Each case writes seven files.
+    #![proptest_config(ProptestConfig {
+        cases: cases() / 3,
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    })]
+
+    #[test]
+    fn every_damage_to_an_ensight_case_is_survived(
+        encoding in prop::sample::select(ensight::ENCODINGS.to_vec()),
+        damages in prop::collection::vec((any::<prop::sample::Index>(), damage()), 1..4),
+    ) {
+        let mut files = ensight::case(encoding);
+        let count = files.len();
+        damages.iter().for_each(|(file, d)| apply(&mut files[file.index(count)].1, d));
+        let dir = tempfile::tempdir().unwrap();
+        ensight::write(dir.path(), &files);
+        match open(dir.path().join("a.case")) {
+            Ok(opened) => use_all(&opened),
+            Err(e) => prop_assert!(e.to_string().contains("; "), "no cure in: {e}"),
+        }
+        assert_memory_is_bounded();
+    }
+}
+
+proptest! {
+    // Each case writes five files.
+    #![proptest_config(ProptestConfig {
+        cases: cases() / 3,
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    })]
+
+    #[test]
+    fn every_damage_to_a_plotfile_is_survived(
+        damages in prop::collection::vec((any::<prop::sample::Index>(), damage()), 1..4),
+    ) {
+        let mut files = amrex::plotfile();
+        let count = files.len();
+        damages.iter().for_each(|(file, d)| apply(&mut files[file.index(count)].1, d));
+        let dir = tempfile::tempdir().unwrap();
+        amrex::write(dir.path(), &files);
         match open(dir.path()) {
             Ok(opened) => use_all(&opened),
             Err(e) => prop_assert!(e.to_string().contains("; "), "no cure in: {e}"),

@@ -112,8 +112,8 @@ impl Dataset {
 
 /// `vtkGhostType` bit for cells (vtkDataSetAttributes.h): 1 = copy of another process's cell.
 const COPIED_CELL: u8 = 1;
-/// `vtkGhostType` bit for cells: 32 = hidden.
-const HIDDEN_CELL: u8 = 32;
+/// `vtkGhostType` bits for cells: 32 = hidden, 8 = covered by finer cells of another block.
+const HIDDEN_CELL: u8 = 32 | 8;
 /// `vtkGhostType` bit for points: 2 = hidden.
 const HIDDEN_POINT: u8 = 2;
 

@@ -15,7 +15,8 @@ use std::path::PathBuf;
   datasets info case --time 0.002
   datasets info --json jet.vti | jq '.parts[].arrays[].name'")]
 pub(super) struct InfoArgs {
-    /// A file of any format that can be read, or the folder of an OpenFOAM case
+    /// A file of any format that can be read, or the folder of an OpenFOAM case or
+    /// AMReX plotfile
     file: PathBuf,
     #[command(flatten)]
     open: OpenArgs,

@@ -6,8 +6,8 @@ use datasets::read::OpenOptions;
 /// What the file does not say itself, or which of its times is meant.
 #[derive(Debug, Clone, Args)]
 pub(super) struct OpenArgs {
-    /// The time to read from a series, a file with several times or an OpenFOAM case [default: the
-    /// first of a series or file, the last of a case]
+    /// The time to read from a series, an OpenFOAM or EnSight case, or a file with several times
+    /// [default: the last of an OpenFOAM case, otherwise the first]
     #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
     time: Option<f64>,
     /// Distance between the points of a NumPy array, or of a NetCDF file without coordinates

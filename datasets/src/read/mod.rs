@@ -4,9 +4,11 @@
 //! that the bytes of the file can justify; everything left out is named in
 //! [`LoadedFile::warnings`]; every error names the file, the position and the cure.
 
+mod amrex;
 pub(crate) mod base64;
 pub mod csv;
 pub mod csv_lattice;
+mod ensight;
 pub mod error;
 pub mod gltf;
 pub(crate) mod hdf5;
@@ -24,6 +26,7 @@ pub mod ply;
 pub mod raw;
 pub mod scene;
 pub mod stl;
+mod tecplot;
 pub(crate) mod time_axis;
 pub(crate) mod volume;
 pub mod vtk_legacy;
@@ -50,7 +53,8 @@ pub struct LoadedFile {
     /// What was left out or repaired, one sentence each; empty if nothing was.
     pub warnings: Vec<String>,
     /// For a time series or a case: every time with its path, in order. `content` holds one of them
-    /// ([`OpenOptions::time`]); open the others by their path.
+    /// ([`OpenOptions::time`]); open the others by their path, or, if it is
+    /// that of the file itself, by their time.
     pub time_steps: Vec<TimeStep>,
 }
 

@@ -2,8 +2,8 @@
 
 use super::error::{Fault, io_error, read_bytes};
 use super::{
-    LoadedFile, OpenOptions, ReadError, gltf, hdf5, mhd, netcdf, npy, nrrd, obj, openfoam, plot3d,
-    ply, raw, stl, time_axis, vtk_legacy, vtk_xml, vtkhdf, xdmf,
+    LoadedFile, OpenOptions, ReadError, amrex, ensight, gltf, hdf5, mhd, netcdf, npy, nrrd, obj,
+    openfoam, plot3d, ply, raw, stl, tecplot, time_axis, vtk_legacy, vtk_xml, vtkhdf, xdmf,
 };
 use std::io::Read;
 use std::path::Path;
@@ -13,7 +13,9 @@ pub const KNOWN: &str = "VTK XML (.vti .vtp .vtu .vtr .vts, their parallel forms
                          legacy (.vtk), VTKHDF (.vtkhdf), NetCDF (.nc), Exodus II (.e .exo), \
                          XDMF (.xdmf .xmf), \
                          PLOT3D (.xyz .x .g .q .bin), NRRD (.nrrd .nhdr), MetaImage (.mhd .mha), \
-                         raw with TOML (.raw), NumPy (.npy .npz), OpenFOAM cases (folders, .foam), OBJ, glTF, PLY, STL";
+                         raw with TOML (.raw), NumPy (.npy .npz), OpenFOAM cases (folders, .foam), \
+                         Tecplot (.dat .tec .plt), EnSight Gold (.case), \
+                         AMReX plotfiles (folders), OBJ, glTF, PLY, STL";
 
 /// Number of bytes examined.
 const HEAD_BYTES: u64 = 1024;
@@ -35,9 +37,17 @@ enum Format {
     Gltf,
     Ply,
     Stl,
+    Tecplot,
+    EnSight,
 }
 
 impl Format {
+    /// Whether a file may hold several times.
+    fn may_have_times(self) -> bool {
+        use Format::*;
+        matches!(self, VtkXml | VtkSeries | VtkHdf | NetCdf | Xdmf | Numpy | Tecplot | EnSight)
+    }
+
     /// Its name, for messages.
     fn name(self) -> &'static str {
         match self {
@@ -56,6 +66,8 @@ impl Format {
             Format::Gltf => gltf::FORMAT,
             Format::Ply => ply::FORMAT,
             Format::Stl => stl::FORMAT,
+            Format::Tecplot => tecplot::FORMAT,
+            Format::EnSight => ensight::FORMAT,
         }
     }
 }
@@ -84,6 +96,9 @@ pub fn open(path: impl AsRef<Path>) -> Result<LoadedFile, ReadError> {
 /// Also if an option means nothing to the format of the file.
 pub fn open_with(path: impl AsRef<Path>, options: &OpenOptions) -> Result<LoadedFile, ReadError> {
     let path = path.as_ref();
+    if amrex::header_of(path).is_some() {
+        return amrex::read(path, options);
+    }
     if openfoam::is_case(path) || path.is_dir() {
         return openfoam::read(path, options);
     }
@@ -116,10 +131,7 @@ pub fn open_with(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Loaded
     if !matches!(format, Format::Numpy | Format::NetCdf) {
         options.refuse_lattice().map_err(|f| f.in_file(path, format.name()))?;
     }
-    let has_times = [Format::VtkXml, Format::VtkSeries, Format::Numpy, Format::VtkHdf]
-        .contains(&format)
-        || [Format::NetCdf, Format::Xdmf].contains(&format);
-    if !has_times {
+    if !format.may_have_times() {
         options.refuse_time().map_err(|f| f.in_file(path, format.name()))?;
     }
     let mut opened = match format {
@@ -138,6 +150,8 @@ pub fn open_with(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Loaded
         Format::Gltf => gltf::read(path),
         Format::Ply => ply::read(path),
         Format::Stl => stl::read(path),
+        Format::Tecplot => tecplot::read(path, options),
+        Format::EnSight => ensight::read(path, options),
     }?;
     // `.g` is PLOT3D's and Exodus II's.
     if let (Some(content), Some(name)) = (by_content, by_name)
@@ -164,6 +178,10 @@ fn from_content(head: &[u8], length: u64) -> Option<Format> {
         Some(Format::NetCdf)
     } else if head.starts_with(npy::MAGIC) {
         Some(Format::Numpy)
+    } else if tecplot::begins_as_tecplot(text) {
+        Some(Format::Tecplot)
+    } else if ensight::begins_as_case(text) {
+        Some(Format::EnSight)
     } else if text.starts_with(b"NRRD000") {
         Some(Format::Nrrd)
     } else if text.starts_with(b"ply\n") || text.starts_with(b"ply\r") {
@@ -230,6 +248,8 @@ fn from_name(path: &Path) -> Option<Format> {
         "gltf" | "glb" => Format::Gltf,
         "ply" => Format::Ply,
         "stl" => Format::Stl,
+        "tec" | "plt" => Format::Tecplot,
+        "case" | "encas" => Format::EnSight,
         _ => return None,
     })
 }

@@ -7,8 +7,7 @@ use super::error::{At, Fault};
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct OpenOptions {
     /// The time to read from a file or folder with several, in the unit of the program that wrote
-    /// it. Without it, the first time of a collection or file and the last one of an OpenFOAM case
-    /// are read.
+    /// it. Without it, the last time of an OpenFOAM case is read, and the first of others.
     pub time: Option<f64>,
     /// Distance between points along x, y and z, for NumPy arrays and NetCDF files without
     /// coordinates.

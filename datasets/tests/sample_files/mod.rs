@@ -1,7 +1,10 @@
 //! Small files of every format for the tests of the readers, built byte by byte or by the writers.
 #![allow(dead_code, reason = "each test uses some of them")]
 
+pub(crate) mod amrex;
+pub(crate) mod ensight;
 pub(crate) mod openfoam;
+pub(crate) mod tecplot;
 
 use datasets::model::*;
 use datasets::write::{Encoding, VtkOptions, write_vtk};
@@ -455,6 +458,9 @@ pub(crate) fn all() -> Vec<Sample> {
         list.push((name, plot3d(&[[3, 2, 2], [2, 2, 2]], true, records, big, true).0));
     }
     list.extend([("a.npz", npz(true)), ("b.npz", npz(false))]);
+    list.push(("a.tec", tecplot::TEXT.into()));
+    let plt = |version, by_point| tecplot::plt(tecplot::Plt { version, big: by_point, by_point });
+    list.extend([("a.plt", plt(112, false)), ("b.plt", plt(107, true)), ("c.plt", plt(75, true))]);
     list.push(("c.xyz", b"2 2 1\n0 1 0 1\n0 0 1 1\n0 0 0 0\n".to_vec()));
     list
 }
