@@ -40,6 +40,25 @@ fn numbers(array: &DataArray) -> Vec<f64> {
 }
 
 #[test]
+fn the_path_of_a_time_is_that_of_its_zones() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("flow.dat");
+    std::fs::write(&path, TEXT).unwrap();
+    let steps = open(&path).unwrap().time_steps;
+    assert_eq!(steps.len(), 2);
+    for step in &steps {
+        let by_path = open(&step.path).unwrap();
+        let by_time =
+            open_with(&path, &OpenOptions { time: Some(step.time), ..Default::default() }).unwrap();
+        assert_eq!(by_path.dataset().unwrap(), by_time.dataset().unwrap(), "{}", step.time);
+    }
+    assert_ne!(
+        open(&steps[0].path).unwrap().dataset().unwrap(),
+        open(&steps[1].path).unwrap().dataset().unwrap()
+    );
+}
+
+#[test]
 fn text_with_every_kind_of_zone() {
     let file = read("flow.dat", TEXT.as_bytes(), None).unwrap();
     let names: Vec<&str> = blocks(&file).iter().map(|b| b.name.as_str()).collect();

@@ -53,8 +53,7 @@ pub struct LoadedFile {
     /// What was left out or repaired, one sentence each; empty if nothing was.
     pub warnings: Vec<String>,
     /// For a time series or a case: every time with its path, in order. `content` holds one of them
-    /// ([`OpenOptions::time`]); open the others by their path, or, if it is
-    /// that of the file itself, by their time.
+    /// ([`OpenOptions::time`]); open the others by their path.
     pub time_steps: Vec<TimeStep>,
 }
 

@@ -23,8 +23,7 @@ pub(crate) fn choose(
             format!("{} of them, more than {MOST}", times.len()),
         ));
     }
-    let step = |&time: &f64| TimeStep { time, part: 0, path: path.join(time.to_string()) };
-    let steps: Vec<TimeStep> = times.iter().map(step).collect();
+    let steps: Vec<TimeStep> = times.iter().map(|&time| step(path, time)).collect();
     let chosen = match time {
         Some(t) => {
             let found = step_at(&steps, t)?;
@@ -39,6 +38,11 @@ pub(crate) fn choose(
         warnings.push(format!("a series of {n} times; this is the first, t = {first}"));
     }
     Ok((chosen, steps))
+}
+
+/// A time of a file, with a path of its own.
+pub(crate) fn step(path: &Path, time: f64) -> TimeStep {
+    TimeStep { time, part: 0, path: path.join(time.to_string()) }
 }
 
 /// The file and the time of a path `FILE/TIME`.

@@ -10,7 +10,7 @@ mod variables;
 
 use super::error::{At, Fault, read_bytes, sibling_path};
 use super::options::step_at;
-use super::{Content, LoadedFile, OpenOptions, ReadError, TimeStep};
+use super::{Content, LoadedFile, OpenOptions, ReadError, TimeStep, time_axis};
 use crate::model::{Block, DataArray, Dataset, Endian, Values};
 use source::Source;
 use std::path::Path;
@@ -31,8 +31,7 @@ pub(crate) fn read(path: &Path, options: &OpenOptions) -> Result<LoadedFile, Rea
     let case = case_file::parse(&String::from_utf8_lossy(&bytes)).map_err(fault)?;
     let mut warnings = case.warnings.clone();
     let times = case.times();
-    let step = |&time: &f64| TimeStep { time, part: 0, path: path.to_path_buf() };
-    let steps: Vec<TimeStep> = times.iter().map(step).collect();
+    let steps: Vec<TimeStep> = times.iter().map(|&time| time_axis::step(path, time)).collect();
     let time = match options.time {
         Some(t) => Some(step_at(&steps, t).map_err(fault)?.time),
         None => times.first().copied(),

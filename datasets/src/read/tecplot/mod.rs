@@ -13,7 +13,7 @@ mod zone;
 
 use super::error::{At, Fault, read_bytes};
 use super::options::step_at;
-use super::{Content, LoadedFile, OpenOptions, ReadError, TimeStep};
+use super::{Content, LoadedFile, OpenOptions, ReadError, TimeStep, time_axis};
 use crate::model::{Block, Dataset};
 use std::path::Path;
 use zone::Zone;
@@ -97,7 +97,7 @@ fn steps(path: &Path, zones: &[Zone]) -> Vec<TimeStep> {
     if times.len() < 2 {
         return Vec::new();
     }
-    times.into_iter().map(|time| TimeStep { time, part: 0, path: path.to_path_buf() }).collect()
+    times.into_iter().map(|time| time_axis::step(path, time)).collect()
 }
 
 fn warn_passive(zones: &[&Zone], names: &[String], warnings: &mut Vec<String>) {
