@@ -1,5 +1,5 @@
-//! VTKHDF, NetCDF, XDMF and Exodus II: files that h5py and netCDF4 wrote (`tests/files/make.py`), and
-//! what VTK itself writes.
+//! VTKHDF, NetCDF, XDMF and Exodus II: files that h5py and netCDF4 wrote (`tests/files/make.py`),
+//! and what VTK itself writes.
 
 mod peer;
 

@@ -1,5 +1,5 @@
-//! Lists the times of a flow: of a collection, a file series, a file with several times, an OpenFOAM
-//! case or a list of files.
+//! Lists the times of a flow: of a collection, a file series, a file with several times, an
+//! OpenFOAM case or a list of files.
 
 use super::InputError;
 use std::path::{Path, PathBuf};

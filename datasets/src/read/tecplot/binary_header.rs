@@ -1,11 +1,12 @@
 //! The header section of a binary Tecplot file: names, zones, and the records left out.
 
 use super::File;
-use super::binary::{Input, ZONE};
+use super::binary_input::Input;
 use super::shapes::Element;
 use super::zone::{Shape, ZoneHeader};
 use crate::read::error::{BROKEN, Fault};
 
+pub(super) const ZONE: f32 = 299.0;
 const GEOMETRY: f32 = 399.0;
 const TEXT: f32 = 499.0;
 const CUSTOM_LABELS: f32 = 599.0;

@@ -5,6 +5,7 @@
 
 mod binary;
 mod binary_header;
+mod binary_input;
 mod scanner;
 mod shapes;
 mod text;

@@ -3,36 +3,16 @@
 //! Source: Tecplot 360 Data Format Guide, chapter "ASCII data".
 
 use super::scanner::{Scanner, real, short};
-use super::text_zone::{self, zone_header};
+use super::text_zone::{self, is_record, zone_header};
 use super::zone::{Shape, Zone, ZoneHeader};
 use super::{FORMAT_CURE, File};
 use crate::model::Values;
-use crate::read::error::{At, Fault, TRUNCATED};
+use crate::read::error::{Fault, TRUNCATED};
 use std::rc::Rc;
-
-/// Words that begin a record.
-const RECORDS: [&str; 11] = [
-    "TITLE",
-    "FILETYPE",
-    "VARIABLES",
-    "ZONE",
-    "TEXT",
-    "GEOMETRY",
-    "CUSTOMLABELS",
-    "DATASETAUXDATA",
-    "VARAUXDATA",
-    "USERREC",
-    "FUNCTION",
-];
 
 /// Values that a file may hold for each of its bytes, by repeat counts and shared variables. A
 /// uniform field takes a few bytes, but its points have coordinates.
 pub(super) const MOST_PER_BYTE: u64 = 128;
-
-/// Whether the word begins a record.
-pub(super) fn is_record(word: &str) -> bool {
-    RECORDS.iter().any(|r| r.eq_ignore_ascii_case(word))
-}
 
 /// Whether a text begins as a Tecplot file does.
 pub(super) fn begins_as_tecplot(head: &str) -> bool {
@@ -196,10 +176,4 @@ fn reals(
     }
     *budget -= count;
     Ok(out)
-}
-
-/// The fault of a number of a zone that is out of range.
-pub(super) fn out_of_range(at: At, title: &str, key: &str, value: &str) -> Fault {
-    let what = format!("zone `{title}`: {key} is `{}`", short(value));
-    Fault::new(at, what, "write a whole number from 1 on")
 }

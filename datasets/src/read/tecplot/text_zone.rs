@@ -3,9 +3,23 @@
 use super::File;
 use super::scanner::{Scanner, Value, real, short};
 use super::shapes::Element;
-use super::text::{is_record, out_of_range};
 use super::zone::{Shape, ZoneHeader};
 use crate::read::error::{At, BROKEN, Fault, fits};
+
+/// Words that begin a record.
+const RECORDS: [&str; 11] = [
+    "TITLE",
+    "FILETYPE",
+    "VARIABLES",
+    "ZONE",
+    "TEXT",
+    "GEOMETRY",
+    "CUSTOMLABELS",
+    "DATASETAUXDATA",
+    "VARAUXDATA",
+    "USERREC",
+    "FUNCTION",
+];
 
 /// Keys that have no meaning for the data.
 const IGNORED: [&str; 5] = ["C", "DT", "NV", "PARENTZONE", "FACENEIGHBORMODE"];
@@ -254,6 +268,17 @@ fn assigned(text: &str, variables: usize, at: &At) -> Result<Vec<(Vec<usize>, St
         rest = after.trim_start_matches([',', ' ', '\t', '\n', '\r']);
     }
     Ok(out)
+}
+
+/// Whether the word begins a record.
+pub(super) fn is_record(word: &str) -> bool {
+    RECORDS.iter().any(|r| r.eq_ignore_ascii_case(word))
+}
+
+/// The fault of a number of a zone that is out of range.
+pub(super) fn out_of_range(at: At, title: &str, key: &str, value: &str) -> Fault {
+    let what = format!("zone `{title}`: {key} is `{}`", short(value));
+    Fault::new(at, what, "write a whole number from 1 on")
 }
 
 #[cfg(test)]
