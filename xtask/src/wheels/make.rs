@@ -113,7 +113,8 @@ fn build_archive(package: &Package, archive: &Path, places: &Places<'_>) -> Resu
     let _ = fs::remove_dir_all(&folder);
     fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
     let mut tar = Command::new("tar");
-    run_it(tar.arg("xzf").arg(archive).arg("--strip-components=1").arg("-C").arg(&folder))?;
+    // `m`: the archive's times are always the same, and cargo would take an older check for this.
+    run_it(tar.arg("xzmf").arg(archive).arg("--strip-components=1").arg("-C").arg(&folder))?;
     let mut cargo = cargo();
     // Not `--locked`: the lock file also names what other members need, and cargo leaves it out.
     cargo.args(["check", "-p", package.member, "--lib", "--target-dir"]);
