@@ -2,9 +2,9 @@
 //! are bent across the borders of bricks.
 //!
 //! Each rank has the density at the nodes of a box, with as many layers around its own cells as the
-//! interpolant's [`Stencil`](schlieren::march::Stencil) needs: none for trilinear interpolation,
+//! interpolant's [`Stencil`] needs: none for trilinear interpolation,
 //! one for trilinear gradients. Where a ray leaves these cells, its state goes to the rank that has
-//! the next one (72 bytes: [`wire`]). Ranks work in rounds: each moves the rays that it has as far
+//! the next one (72 bytes: `wire.rs`). Ranks work in rounds: each moves the rays that it has as far
 //! as it can, then all exchange what has left. A ray needs as many rounds as it changes bricks.
 //!
 //! Every step of a ray takes one sample, at a place that follows from its state
