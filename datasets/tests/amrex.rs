@@ -57,6 +57,23 @@ fn each_place_has_the_values_of_its_finest_cells() {
 }
 
 #[test]
+fn boxes_keep_their_places_whatever_files_they_are_in() {
+    let [one, two] = [(); 2].map(|()| tempfile::tempdir().unwrap());
+    let mut files = plotfile();
+    write(one.path(), &files);
+    let list = files.iter_mut().find(|f| f.0 == "Level_0/Cell_H").unwrap();
+    let text = String::from_utf8(list.1.clone()).unwrap();
+    let first = "FabOnDisk: Cell_D_00000 0\n";
+    assert!(text.contains(first), "{text}");
+    list.1 = text.replacen(first, "FabOnDisk: Cell_D_00001 0\n", 1).into_bytes();
+    let data = files.iter().find(|f| f.0 == "Level_0/Cell_D_00000").unwrap().1.clone();
+    files.push(("Level_0/Cell_D_00001".into(), data));
+    write(two.path(), &files);
+    let [one, two] = [one, two].map(|dir| open(dir.path()).unwrap());
+    assert_eq!(one.dataset().unwrap(), two.dataset().unwrap());
+}
+
+#[test]
 fn a_wrong_plotfile_names_the_file_the_place_and_a_cure() {
     for (name, from, to, words) in [
         ("Header", "HyperCLaw", "Other", ["Header", "in line 1"]),

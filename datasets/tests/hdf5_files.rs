@@ -378,3 +378,40 @@ fn xdmf_times_that_share_a_mesh_and_boxes_of_hdf5() {
     let second = open(&opened.time_steps[1].path).unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(row(&second), [7., 8., 9., 10., 11., 12., 13.]);
 }
+
+/// A classic NetCDF file with these dimensions, and `coordx` over the first of them.
+fn classic(dimensions: &[(&str, u32)]) -> Vec<u8> {
+    let mut out = b"CDF\x01\0\0\0\0".to_vec();
+    let name = |out: &mut Vec<u8>, name: &str| {
+        out.extend((name.len() as u32).to_be_bytes());
+        out.extend(name.bytes());
+        out.resize(out.len().next_multiple_of(4), 0);
+    };
+    let words = |out: &mut Vec<u8>, words: &[u32]| {
+        words.iter().for_each(|w| out.extend(w.to_be_bytes()));
+    };
+    words(&mut out, &[10, dimensions.len() as u32]);
+    for (of, length) in dimensions {
+        name(&mut out, of);
+        words(&mut out, &[*length]);
+    }
+    // No attributes; one variable of doubles, whose values follow.
+    words(&mut out, &[0, 0, 11, 1]);
+    name(&mut out, "coordx");
+    let size = 8 * dimensions[0].1;
+    let begin = out.len() as u32 + 7 * 4;
+    words(&mut out, &[1, 0, 0, 0, 6, size, begin]);
+    (0..dimensions[0].1).for_each(|i| out.extend(f64::from(i).to_be_bytes()));
+    out
+}
+
+#[test]
+fn sets_of_exodus_are_not_left_out_in_silence() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("sets.exo");
+    let dims = [("num_nodes", 2), ("num_dim", 1), ("num_elem", 1), ("num_side_sets", 3)];
+    std::fs::write(&path, classic(&dims)).unwrap();
+    let opened = datasets::read::open(&path).unwrap();
+    assert_eq!(opened.format, "Exodus II");
+    assert_eq!(opened.warnings, ["3 side sets (boundaries) left out"]);
+}

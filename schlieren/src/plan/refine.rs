@@ -90,15 +90,4 @@ impl Plan {
             }
         }
     }
-
-    /// What the request sets, as keys of a scene and options of the program.
-    pub(crate) fn set_by_request(request: &Request) -> Vec<&'static str> {
-        let set = [
-            (request.mode.is_some(), "march.method (--march)"),
-            (request.interpolant.is_some(), "march.interpolant (--interpolant)"),
-            (request.step_voxels.is_some(), "march.step_voxels (--step)"),
-            (request.skip_rad > 0.0, "march.skip_rad (--skip)"),
-        ];
-        set.into_iter().filter(|s| s.0).map(|s| s.1).collect()
-    }
 }

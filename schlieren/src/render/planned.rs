@@ -88,7 +88,7 @@ fn accuracy_warnings(achieved: &MeasuredError, request: &Request) -> Vec<String>
     let mut warnings = Vec::new();
     if max_rad > tolerance_rad {
         let [error, tolerance] = told_apart(max_rad, tolerance_rad);
-        let set = Plan::set_by_request(request).join(", ");
+        let set = what_is_set(request).join(", ");
         let cause = if resolution_rad > tolerance_rad {
             "the flow has structures that its lattice does not resolve: smooth shocks \
              (flow.smoothing_nodes, --smoothing) or use a finer lattice"
@@ -118,6 +118,17 @@ fn accuracy_warnings(achieved: &MeasuredError, request: &Request) -> Vec<String>
         ));
     }
     warnings
+}
+
+/// What the request sets, as keys of a scene and options of the program.
+fn what_is_set(request: &Request) -> Vec<&'static str> {
+    let set = [
+        (request.mode.is_some(), "march.method (--march)"),
+        (request.interpolant.is_some(), "march.interpolant (--interpolant)"),
+        (request.step_voxels.is_some(), "march.step_voxels (--step)"),
+        (request.skip_rad > 0.0, "march.skip_rad (--skip)"),
+    ];
+    set.into_iter().filter(|s| s.0).map(|s| s.1).collect()
 }
 
 /// Two different numbers with as many digits as tell them apart, two at least.

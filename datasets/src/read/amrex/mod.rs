@@ -49,9 +49,15 @@ pub(crate) fn read(path: &Path, options: &OpenOptions) -> Result<LoadedFile, Rea
         levels.push((list, boxes));
     }
     let mut blocks = Vec::new();
-    let mut file: Option<(PathBuf, Vec<u8>)> = None;
     for (l, (list, boxes)) in levels.iter().enumerate() {
-        for (i, b) in boxes.iter().enumerate() {
+        // Boxes of ranks take turns in the list, and each rank has a file: file by file, each is
+        // read once.
+        let mut by_file: Vec<usize> = (0..boxes.len()).collect();
+        by_file.sort_by_key(|&i| &boxes[i].file);
+        let mut file: Option<(PathBuf, Vec<u8>)> = None;
+        let mut of_level = Vec::with_capacity(boxes.len());
+        for i in by_file {
+            let b = &boxes[i];
             let name = list.with_file_name(&b.file);
             if file.as_ref().is_none_or(|f| f.0 != name) {
                 file = Some((name.clone(), read_bytes(&name)?));
@@ -67,8 +73,10 @@ pub(crate) fn read(path: &Path, options: &OpenOptions) -> Result<LoadedFile, Rea
             }
             let data = Dataset::ImageData(data);
             data.check().map_err(|e| in_file(e.into()))?;
-            blocks.push(Block { name: format!("level {l} box {i}"), data });
+            of_level.push((i, Block { name: format!("level {l} box {i}"), data }));
         }
+        of_level.sort_by_key(|(i, _)| *i);
+        blocks.extend(of_level.into_iter().map(|(_, block)| block));
     }
     let mut warnings = h.warnings.clone();
     if blocks.is_empty() {

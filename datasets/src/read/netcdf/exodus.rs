@@ -65,6 +65,14 @@ pub(super) fn dataset(
     if model.find("name_glo_var").is_some() {
         warnings.push("global variables (one number a time) left out".into());
     }
+    for (dimension, what) in
+        [("num_node_sets", "node sets"), ("num_side_sets", "side sets (boundaries)")]
+    {
+        let found = file.header().dimensions.iter().find(|d| d.name == dimension);
+        if let Some(d) = found.filter(|d| d.length > 0) {
+            warnings.push(format!("{} {what} left out", d.length));
+        }
+    }
     if model.names("eb_names")?.iter().any(|n| !n.is_empty()) {
         out.text.push(("element blocks".into(), model.names("eb_names")?));
     }
