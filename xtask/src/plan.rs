@@ -12,17 +12,16 @@ const fn cargo(args: &'static [&'static str]) -> Action {
     Action::Cargo { args, env: &[] }
 }
 
+/// The step that waits for the peers. Those before it run while these are being installed, which
+/// mostly waits for the network and the disk.
+pub(crate) const PEERS: &str = "peers";
+
 /// All steps, in execution order.
 pub(crate) const STEPS: &[Step] = &[
     Step {
         name: "tools",
         tells: "the compiler is new enough; rustfmt and clippy are there",
         action: Action::Call(tools::check_tools),
-    },
-    Step {
-        name: "peers",
-        tells: "the software that tests compare with is installed",
-        action: Action::Call(tools::report_peers),
     },
     Step {
         name: "fmt",
@@ -113,6 +112,11 @@ pub(crate) const STEPS: &[Step] = &[
         ]),
     },
     Step {
+        name: PEERS,
+        tells: "the software that tests compare with is installed",
+        action: Action::Call(tools::report_peers),
+    },
+    Step {
         name: "build-tests",
         tells: "all tests compile, and so do the programs and the shared library (for SimGrid) \
                 that they run",
@@ -175,6 +179,18 @@ mod tests {
             main_job::ARGUMENTS.is_empty(),
             "without a command, bench runs the quick form of everything"
         );
+    }
+
+    #[test]
+    fn what_runs_beside_the_installation_needs_no_peers() {
+        let peers = STEPS.iter().position(|s| s.name == PEERS).expect("peers");
+        let builds_only = ["fmt", "clippy", "check", "test --quiet --manifest-path xtask"];
+        for step in &STEPS[..peers] {
+            if let Action::Cargo { args, .. } = step.action {
+                let line = args.join(" ");
+                assert!(builds_only.iter().any(|b| line.starts_with(b)), "{}: {line}", step.name);
+            }
+        }
     }
 
     #[test]

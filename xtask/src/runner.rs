@@ -1,10 +1,11 @@
 //! Runs the steps, prints every command before it runs, and prints the cost of all at the end.
 
+use std::ops::Range;
 use std::path::Path;
 use std::time::Instant;
 
-use crate::peers::{self, Install};
-use crate::plan::STEPS;
+use crate::peers::{self, Install, Peers};
+use crate::plan::{PEERS, STEPS};
 use crate::step::{Action, Context, Outcome, Step};
 use crate::{Exit, TestOptions};
 
@@ -17,37 +18,66 @@ pub(crate) fn run(root: &Path, options: &TestOptions) -> Exit {
         .collect();
 
     let started = Instant::now();
-    let peers = peers::set_up(root, install);
-    let mut report = vec![("set-up", Outcome::Passed, started.elapsed().as_secs_f64())];
-
-    let context = Context { root, options, peers: &peers };
-    let mut exit = Exit::Success;
-    for (i, step) in chosen.iter().enumerate() {
-        println!("\n==> [{}/{}] {}: {}", i + 1, chosen.len(), step.name, describe(&step.action));
-        let begun = Instant::now();
-        let outcome = match &step.action {
-            Action::Call(f) => f(&context),
-            Action::Cargo { args, env } => context.cargo(args, env),
-        };
-        let ended = match &outcome {
-            Outcome::Failed(_) => Some(Exit::StepFailed),
-            Outcome::PeerMissing(_) => Some(Exit::PeerMissing),
-            Outcome::NotRun(why) => {
-                println!("not run: {why}");
-                None
+    let mut run = Run { chosen: &chosen, report: vec![], exit: None };
+    let early = chosen.iter().take_while(|s| runs_beside_set_up(s)).count();
+    let peers = std::thread::scope(|scope| {
+        let set_up = scope.spawn(|| (peers::set_up(root, install), started.elapsed()));
+        run.steps(0..early, &Context { root, options, peers: &Peers::default() });
+        match set_up.join() {
+            Ok((peers, took)) => {
+                run.report.push(("set-up", Outcome::Passed, took.as_secs_f64()));
+                peers
             }
-            Outcome::Passed => None,
-        };
-        report.push((step.name, outcome, begun.elapsed().as_secs_f64()));
-        if let Some(code) = ended {
-            exit = code;
-            break;
+            Err(panic) => std::panic::resume_unwind(panic),
         }
-    }
+    });
+    run.steps(early..chosen.len(), &Context { root, options, peers: &peers });
+    let Run { report, exit, .. } = run;
     let left = chosen.len() + 1 - report.len();
     print!("{}", summary(&report, left, started.elapsed().as_secs_f64()));
     print!("{}", peers.describe());
-    exit
+    exit.unwrap_or(Exit::Success)
+}
+
+/// Whether a step needs no peers: those before [`PEERS`].
+fn runs_beside_set_up(step: &Step) -> bool {
+    STEPS.iter().take_while(|s| s.name != PEERS).any(|s| s.name == step.name)
+}
+
+/// What has run so far.
+struct Run<'a> {
+    chosen: &'a [&'a Step],
+    report: Vec<(&'static str, Outcome, f64)>,
+    exit: Option<Exit>,
+}
+
+impl Run<'_> {
+    /// Runs some of the chosen steps, until one fails.
+    fn steps(&mut self, range: Range<usize>, context: &Context<'_>) {
+        for i in range {
+            if self.exit.is_some() {
+                return;
+            }
+            let step = self.chosen[i];
+            let (number, action) = (i + 1, describe(&step.action));
+            println!("\n==> [{number}/{}] {}: {action}", self.chosen.len(), step.name);
+            let begun = Instant::now();
+            let outcome = match &step.action {
+                Action::Call(f) => f(context),
+                Action::Cargo { args, env } => context.cargo(args, env),
+            };
+            self.exit = match &outcome {
+                Outcome::Failed(_) => Some(Exit::StepFailed),
+                Outcome::PeerMissing(_) => Some(Exit::PeerMissing),
+                Outcome::NotRun(why) => {
+                    println!("not run: {why}");
+                    None
+                }
+                Outcome::Passed => None,
+            };
+            self.report.push((step.name, outcome, begun.elapsed().as_secs_f64()));
+        }
+    }
 }
 
 /// Prints the steps without running them.
