@@ -8,6 +8,7 @@
 
 use crate::field::Field;
 use rayon::prelude::*;
+use std::cmp::Ordering;
 
 /// Largest absolute values in a field, per metre to the power of the order.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -25,6 +26,9 @@ pub struct DerivativeBounds {
     /// Fourth derivatives along the lattice's axes. Splines are products of splines along the axes,
     /// so these determine their errors.
     pub fourth: f64,
+    /// The node of the largest fourth derivative, where a lattice follows its flow least, at least
+    /// three nodes from the faces. Of equal ones, the first in the order of the nodes.
+    pub fourth_at: [usize; 3],
     /// |eps|.
     pub eps: f64,
 }
@@ -95,6 +99,14 @@ impl DerivativeBounds {
             second_along_axes: self.second_along_axes.max(other.second_along_axes),
             third: self.third.max(other.third),
             fourth: self.fourth.max(other.fourth),
+            fourth_at: match self.fourth.total_cmp(&other.fourth) {
+                Ordering::Greater => self.fourth_at,
+                Ordering::Less => other.fourth_at,
+                Ordering::Equal => {
+                    let order = |[i, j, k]: [usize; 3]| [k, j, i];
+                    order(order(self.fourth_at).min(order(other.fourth_at)))
+                }
+            },
             eps: self.eps.max(other.eps),
         }
     }
@@ -154,8 +166,24 @@ impl Row {
             second_along_axes: largest(&self.squares[ALONG_AXES]),
             third: largest(&self.squares[2]),
             fourth: largest(&self.squares[3]),
+            fourth_at: self.node_of_fourth(j, k, [nx, dims[1], dims[2]]),
             eps: f64::from(nodes.iter().fold(0.0f32, |m, e| m.max(e.abs()))),
         }
+    }
+}
+
+impl Row {
+    /// The node in the middle of the row's largest fourth difference.
+    fn node_of_fourth(&self, j: usize, k: usize, dims: [usize; 3]) -> [usize; 3] {
+        let squares = self.squares[3].iter().enumerate();
+        let largest = squares.fold((0, 0.0f64), |m, (i, s)| if *s > m.1 { (i, *s) } else { m });
+        // A difference begins two nodes before its middle. Rays beside the node shall not leave
+        // the field.
+        let middle = |first: usize, n: usize| match n.checked_sub(4) {
+            Some(last) if last >= 3 => (first + 2).clamp(3, last),
+            _ => n / 2,
+        };
+        [middle(largest.0, dims[0]), middle(j, dims[1]), middle(k, dims[2])]
     }
 }
 

@@ -26,6 +26,7 @@ pub struct Field {
     n0: f64,
     nodes: Option<Vec<Node>>,
     not_finite: usize,
+    truncation: Vec<f32>,
 }
 
 /// Why a lattice cannot be a field.
@@ -147,7 +148,44 @@ impl Field {
             }
             fill(dims, &mut eps, n);
         }
-        Ok(Field { dims, spacing_m, origin_m, eps, n0, nodes, not_finite })
+        let truncation = vec![];
+        Ok(Field { dims, spacing_m, origin_m, eps, n0, nodes, not_finite, truncation })
+    }
+
+    /// Adds by how much eps would differ if the mesh that it comes from were read by a less accurate
+    /// reconstruction ([`datasets::resample::ResampledField::truncation`]), x fastest, from which
+    /// [`crate::plan::MeasuredError::mesh_rad`] follows. What is not finite is taken as zero.
+    ///
+    /// # Errors
+    /// If there is not one value for each node.
+    pub fn with_truncation(mut self, mut truncation: Vec<f32>) -> Result<Field, FieldError> {
+        let (dims, got, wanted) = (self.dims, truncation.len(), self.eps.len());
+        if got != wanted {
+            return Err(FieldError::Length { what: "the truncation", got, dims, wanted });
+        }
+        truncation.iter_mut().filter(|t| !t.is_finite()).for_each(|t| *t = 0.0);
+        self.truncation = truncation;
+        Ok(self)
+    }
+
+    /// The truncation as a field of its own, at the same nodes; `None` for a field that comes from
+    /// no mesh.
+    pub fn truncation(&self) -> Option<Field> {
+        if self.truncation.is_empty() {
+            return None;
+        }
+        // Differences of eps are far above -1 wherever they say anything.
+        let eps = self.truncation.iter().map(|t| t.max(-0.5)).collect();
+        Some(Field {
+            dims: self.dims,
+            spacing_m: self.spacing_m,
+            origin_m: self.origin_m,
+            eps,
+            n0: self.n0,
+            nodes: self.nodes.clone(),
+            not_finite: 0,
+            truncation: vec![],
+        })
     }
 
     /// Creates a field from a function of position in metres.
@@ -239,7 +277,8 @@ impl Field {
 
     /// Memory of the arrays in bytes.
     pub fn memory_bytes(&self) -> usize {
-        self.eps.len() * size_of::<f32>() + self.nodes.as_ref().map_or(0, Vec::len)
+        (self.eps.len() + self.truncation.len()) * size_of::<f32>()
+            + self.nodes.as_ref().map_or(0, Vec::len)
     }
 }
 

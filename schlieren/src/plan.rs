@@ -40,8 +40,10 @@ use crate::march::{
 use crate::path::{Exit, LightPaths, PathQuantities, Start, Status};
 use crate::view::View;
 use glam::DVec3;
+use mesh_error::largest_deflection;
 use std::sync::Arc;
 
+mod mesh_error;
 mod refine;
 
 pub use crate::derivative_bounds::DerivativeBounds;
@@ -137,8 +139,26 @@ pub struct MeasuredError {
     /// difference between rays through the spline and rays through polynomials of fifth degree,
     /// both of the same nodes. Infinite when the field has too few nodes for an estimate.
     pub resolution_rad: f64,
+    /// Error of the deflection due to the mesh that the field was resampled from, estimated from
+    /// what the last degree of the polynomials between its points adds. `None` for a field that
+    /// comes from no mesh.
+    pub mesh_rad: Option<f64>,
     /// Number of rays compared.
     pub rays: usize,
+}
+
+impl MeasuredError {
+    /// The error of the flow itself, which no march can mend: that of its lattice, if there is an
+    /// estimate, and that of its mesh.
+    pub fn of_flow_rad(&self) -> f64 {
+        Some(self.resolution_rad).filter(|r| r.is_finite()).unwrap_or(0.0)
+            + self.mesh_rad.unwrap_or(0.0)
+    }
+
+    /// The sum of all errors.
+    pub fn total_rad(&self) -> f64 {
+        self.max_rad + self.of_flow_rad()
+    }
 }
 
 /// Shortest step that a plan chooses. Shorter steps do not improve the result on interpolated
@@ -331,10 +351,12 @@ impl Plan {
         rays: usize,
         cache: &FieldCache,
     ) -> (Vec<Start>, MeasuredError) {
-        let starts = sample_starts(field.size_m(), field.centre_m(), &view, rays.max(1));
+        let mut starts = sample_starts(field.size_m(), field.centre_m(), &view, rays.max(1));
+        starts.extend(starts_around(field, self.derivative_bounds.fourth_at, &view));
         let (max_rad, rms_rad, rays) = self.march_error(field, view, &starts, cache);
         let resolution_rad = self.resolution_error(field, view, &starts, cache);
-        (starts, MeasuredError { max_rad, rms_rad, resolution_rad, rays })
+        let mesh_rad = mesh_error::mesh_error(field, view, &starts);
+        (starts, MeasuredError { max_rad, rms_rad, resolution_rad, mesh_rad, rays })
     }
 
     /// [`Plan::measure`] that reuses what `cache` holds for this field.
@@ -395,12 +417,7 @@ impl Plan {
             paths.trace_parallel(starts, &mut exits);
             exits
         });
-        let largest = spline
-            .iter()
-            .filter(|e| e.status == Status::Free)
-            .map(|e| f64::from(e.deflection_rad[0]).hypot(f64::from(e.deflection_rad[1])))
-            .fold(0.0, f64::max);
-        resolution_error(compare(&spline, &polynomials).0, largest)
+        resolution_error(compare(&spline, &polynomials).0, largest_deflection(&spline))
     }
 }
 
@@ -411,7 +428,7 @@ const RESOLUTION_STEP: f64 = 0.3;
 /// (tests/plan.rs) it is 0.4 to 3.7 times the difference where the flow is resolved. Beyond that,
 /// neither interpolant is near the truth: across a jump from node to node, it is 1.3 to 7 times the
 /// difference, which then is more than a tenth of the largest deflection.
-const RESOLVED: f64 = 2.5;
+const RESOLVED: f64 = 3.0;
 const UNRESOLVED: f64 = 7.5;
 const UNRESOLVED_SHARE: [f64; 2] = [0.1, 0.2];
 
@@ -460,6 +477,20 @@ pub(crate) fn sample_starts(
             Start { position_m, tilt_rad: [0.0; 2] }
         })
         .collect()
+}
+
+/// Starts of rays through a node and up to two nodes beside it. The largest errors are where a flow has a kink, as
+/// at the axis of a ring, and rays that are spread evenly pass it by.
+fn starts_around(field: &Field, node: [usize; 3], view: &View) -> impl Iterator<Item = Start> {
+    let h = DVec3::from(field.spacing_m());
+    let from_centre = field.origin_m() + h * DVec3::from(node.map(|i| i as f64)) - view.centre_m;
+    let step = [view.right, view.up].map(|axis| 2.0 / 3.0 * (h * axis.abs()).max_element());
+    let middle = [view.right, view.up].map(|axis| from_centre.dot(axis));
+    (0..49).map(move |i| {
+        let offset = [i % 7, i / 7].map(|n| f64::from(n) - 3.0);
+        let position_m = [0, 1].map(|c| (middle[c] + offset[c] * step[c]) as f32);
+        Start { position_m, tilt_rad: [0.0; 2] }
+    })
 }
 
 /// The path of light through a field's box.

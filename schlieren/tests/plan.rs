@@ -277,7 +277,8 @@ fn a_plan_that_misses_its_tolerance_is_refined_until_it_keeps_it() {
                 let before = plan.measure(&field, view, 200);
                 let (chosen, after) = plan.within_tolerance(&field, view, 200, &cache);
                 let what = format!("{name}, {tolerance:e}: {plan:?} {before:?}, {chosen:?}");
-                let goal = tolerance.max(0.1 * before.resolution_rad);
+                let of_flow = before.of_flow_rad();
+                let goal = (tolerance - of_flow).max(0.1 * of_flow);
                 assert!(chosen.request == asked && after.max_rad <= goal, "{after:?} of {what}");
                 assert_eq!(chosen == plan, before.max_rad <= goal, "{what}");
                 refined[chosen.mode as usize] += usize::from(chosen != plan);

@@ -232,6 +232,11 @@ pub struct ResampledField {
     pub lattice: Lattice,
     /// Values at the nodes, x fastest; NaN where the mark is not [`Mark::Inside`].
     pub values: Vec<f32>,
+    /// About the error that the mesh itself makes, whatever the lattice: by how much the values
+    /// would differ with polynomials of second degree instead of third. Where none fits, three
+    /// times what is added to the linear elements. Empty with [`Reconstruction::Linear`], which
+    /// has nothing to compare with.
+    pub truncation: Vec<f32>,
     /// The mark of each node.
     pub marks: Vec<Mark>,
     /// Statistics and errors of the resampling.
@@ -289,12 +294,12 @@ pub fn resample(
         (Reconstruction::Cubic, None) => PointField::of_points(mesh, points),
         (Reconstruction::Cubic, Some(cells)) => PointField::of_cells(mesh, cells, points),
     };
-    let (values, marks, counts) =
+    let rasterize::Nodes { values, truncation, marks, counts } =
         rasterize::rasterize(mesh, &field, cells, lattice, options.samples_per_axis);
     let resampling_error = report::resampling_error(mesh, samples, lattice, &values);
     let fit = field.quality(mesh);
     let report = Report { fit, ..Report::new(mesh, &marks, counts, resampling_error) };
-    Ok(ResampledField { lattice: *lattice, values, marks, report })
+    Ok(ResampledField { lattice: *lattice, values, truncation, marks, report })
 }
 
 /// Whether there is a value for each point or cell.

@@ -36,11 +36,14 @@ pub(super) struct Counts {
 #[derive(Debug, Clone, Copy)]
 struct Sample {
     value: f64,
+    /// The last part of the value ([`PointField::at`]).
+    last: f64,
     outside: f64,
     mark: Mark,
 }
 
-const NO_SAMPLE: Sample = Sample { value: f64::NAN, outside: f64::INFINITY, mark: Mark::Outside };
+const NO_SAMPLE: Sample =
+    Sample { value: f64::NAN, last: 0.0, outside: f64::INFINITY, mark: Mark::Outside };
 
 /// Rank of marks by information: a cell with values takes precedence over a hidden one.
 fn rank(mark: Mark) -> u8 {
@@ -85,6 +88,15 @@ impl FineLattice<'_> {
     }
 }
 
+/// What all nodes get, x fastest.
+pub(super) struct Nodes {
+    pub(super) values: Vec<f32>,
+    /// See [`super::ResampledField::truncation`]; zero where there is no value.
+    pub(super) truncation: Vec<f32>,
+    pub(super) marks: Vec<Mark>,
+    pub(super) counts: Counts,
+}
+
 /// Values and marks of all nodes.
 pub(super) fn rasterize(
     mesh: &Mesh,
@@ -92,7 +104,7 @@ pub(super) fn rasterize(
     of_cells: Option<&[f64]>,
     lattice: &Lattice,
     samples_per_axis: usize,
-) -> (Vec<f32>, Vec<Mark>, Counts) {
+) -> Nodes {
     let fine = FineLattice { lattice, n: samples_per_axis };
 
     // Range of layers that each cell overlaps.
@@ -134,9 +146,16 @@ pub(super) fn rasterize(
     let in_gaps = AtomicUsize::new(0);
     let per_layer = lattice.dims[0] * lattice.dims[1];
     let mut values = vec![f32::NAN; lattice.len()];
+    let mut truncation = vec![0.0; if field.is_linear() { 0 } else { lattice.len() }];
     let mut marks = vec![Mark::Outside; lattice.len()];
-    values.par_chunks_mut(per_layer).zip(marks.par_chunks_mut(per_layer)).enumerate().for_each(
-        |(k, (values, marks))| {
+    let mut layers_of_truncation: Vec<&mut [f32]> = truncation.chunks_mut(per_layer).collect();
+    layers_of_truncation.resize_with(layers, Default::default);
+    values
+        .par_chunks_mut(per_layer)
+        .zip(marks.par_chunks_mut(per_layer))
+        .zip(layers_of_truncation)
+        .enumerate()
+        .for_each(|(k, ((values, marks), truncation))| {
             let mut samples = vec![NO_SAMPLE; fine.count(0) * fine.count(1) * fine.n];
             let mut scratch = Scratch::default();
             for &cell in &cells[starts[k]..starts[k + 1]] {
@@ -155,9 +174,8 @@ pub(super) fn rasterize(
                 .filter(|s| s.outside > INSIDE_TOLERANCE && s.outside <= NEAR)
                 .count();
             in_gaps.fetch_add(gaps, Ordering::Relaxed);
-            reduce(&fine, k, &samples, values, marks);
-        },
-    );
+            reduce(&fine, k, &samples, values, truncation, marks);
+        });
     let count = |flags: &[AtomicBool]| flags.iter().filter(|f| f.load(Ordering::Relaxed)).count();
     let counts = Counts {
         in_gaps: in_gaps.into_inner(),
@@ -165,7 +183,7 @@ pub(super) fn rasterize(
         without_samples: mesh.num_cells() - count(&seen) - non_finite,
         non_finite,
     };
-    (values, marks, counts)
+    Nodes { values, truncation, marks, counts }
 }
 
 /// Bounding box of a cell, enlarged by [`NEAR`]; `None` when a corner is not finite.
@@ -248,7 +266,7 @@ impl CellData<'_> {
                         continue;
                     };
                     hit = true;
-                    let value = self.field.at(self.mesh, &corners.ids, &scratch.weights, p);
+                    let [value, last] = self.field.at(self.mesh, &corners.ids, &scratch.weights, p);
                     let mark = if own_mark == Mark::Inside && !value.is_finite() {
                         Mark::NotFinite
                     } else {
@@ -260,7 +278,7 @@ impl CellData<'_> {
                     let key = |outside: f64, mark: Mark| (outside == 0.0, rank(mark));
                     let (new, old) = (key(outside, mark), key(slot.outside, slot.mark));
                     if new > old || new == old && outside < slot.outside {
-                        *slot = Sample { value, outside, mark };
+                        *slot = Sample { value, last, outside, mark };
                     }
                 }
             }
@@ -276,13 +294,14 @@ fn reduce(
     k: usize,
     samples: &[Sample],
     values: &mut [f32],
+    truncation: &mut [f32],
     marks: &mut [Mark],
 ) {
     let n = fine.n;
     let width = fine.count(0);
     for (node, (value, mark)) in values.iter_mut().zip(marks).enumerate() {
         let (i, j) = (node % fine.lattice.dims[0], node / fine.lattice.dims[0]);
-        let (mut sum, mut count, mut all) = (0.0, 0usize, 0usize);
+        let (mut sum, mut last, mut count, mut all) = (0.0, 0.0, 0usize, 0usize);
         let mut others = [0usize; 3];
         for z in 0..n {
             for y in j * n..(j + 1) * n {
@@ -295,6 +314,7 @@ fn reduce(
                     match s.mark {
                         Mark::Inside => {
                             sum += s.value;
+                            last += s.last;
                             count += 1;
                         }
                         other => others[rank(other) as usize] += 1,
@@ -304,6 +324,9 @@ fn reduce(
         }
         if count > 0 && 2 * count >= all {
             (*value, *mark) = ((sum / count as f64) as f32, Mark::Inside);
+            if let Some(t) = truncation.get_mut(node) {
+                *t = (last / count as f64) as f32;
+            }
         } else {
             let most = others.iter().max().copied().unwrap_or(0);
             *mark = [Mark::NotFinite, Mark::Hidden, Mark::Outside]

@@ -58,15 +58,23 @@ pub fn revolve(
     let per_layer = lattice.dims[0] * lattice.dims[1];
     let mut values = vec![f32::NAN; lattice.len()];
     let mut marks = vec![Mark::Outside; lattice.len()];
-    values.par_chunks_mut(per_layer).zip(marks.par_chunks_mut(per_layer)).enumerate().for_each(
-        |(k, (values, marks))| {
-            for (n, (value, mark)) in values.iter_mut().zip(marks).enumerate() {
-                let p = lattice.node(n % lattice.dims[0], n / lattice.dims[0], k);
-                let r = p.y.hypot(p.z).max(r_low);
-                (*value, *mark) = sample_image(&flat, p.x, r);
-            }
-        },
-    );
+    let at = |n: usize| {
+        let p =
+            lattice.node(n % lattice.dims[0], n / lattice.dims[0] % lattice.dims[1], n / per_layer);
+        (p.x, p.y.hypot(p.z).max(r_low))
+    };
+    values.par_iter_mut().zip(&mut marks).enumerate().for_each(|(n, (value, mark))| {
+        let (x, r) = at(n);
+        (*value, *mark) = sample_image(&flat, x, r);
+    });
+    let mut truncation = vec![];
+    if !flat.truncation.is_empty() {
+        truncation.resize(lattice.len(), 0.0);
+        truncation.par_iter_mut().enumerate().for_each(|(n, t)| {
+            let (x, r) = at(n);
+            *t = truncation_at(&flat, x, r);
+        });
+    }
     let resampling_error = report::resampling_error(mesh, samples, lattice, &values);
     let of = |m: Mark| marks.iter().filter(|x| **x == m).count();
     let report = Report {
@@ -77,7 +85,7 @@ pub fn revolve(
         resampling_error,
         ..flat.report
     };
-    Ok(ResampledField { lattice: *lattice, values, marks, report })
+    Ok(ResampledField { lattice: *lattice, values, truncation, marks, report })
 }
 
 /// The polynomial through the four by four samples around sample position (u, v), within their
@@ -111,6 +119,14 @@ fn cubic(flat: &ResampledField, u: f64, v: f64) -> Option<f64> {
 fn lagrange(t: f64) -> [f64; 4] {
     let [a, b, c, d] = [t + 1.0, t, t - 1.0, t - 2.0];
     [-b * c * d / 6.0, a * c * d / 2.0, -a * b * d / 2.0, a * b * c / 6.0]
+}
+
+/// The truncation at the nearest sample of the image; zero beside it.
+fn truncation_at(flat: &ResampledField, x: f64, r: f64) -> f32 {
+    let Lattice { dims, origin, spacing } = &flat.lattice;
+    let (u, v) = ((x - origin.x) / spacing.x, (r - origin.y) / spacing.y);
+    let nearest = |u: f64, n: usize| u.round().clamp(0.0, (n - 1) as f64) as usize;
+    flat.truncation[nearest(u, dims[0]) + dims[0] * nearest(v, dims[1])]
 }
 
 /// Cubic interpolation in the image if the samples around have values, bilinear if only four have;

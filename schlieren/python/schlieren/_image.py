@@ -38,6 +38,8 @@ class Report:
         The one that was measured, from march and interpolation.
     resolution_error_rad : float or None
         An estimate of that from the field's own lattice.
+    mesh_error_rad : float or None
+        An estimate of that from the mesh that the field comes from.
     largest_deflection_rad : float or None
         With the layer ``"deflection"``.
     silhouette_error_px : float or None
@@ -63,6 +65,7 @@ class Report:
     tolerance_rad: float
     deflection_error_rad: float | None
     resolution_error_rad: float | None
+    mesh_error_rad: float | None
     largest_deflection_rad: float | None
     silhouette_error_px: float | None
     march: str

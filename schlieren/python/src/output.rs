@@ -108,6 +108,7 @@ impl Output {
             "tolerance_rad": self.scene.march.tolerance_rad,
             "deflection_error_rad": r.deflection_error_rad,
             "resolution_error_rad": r.resolution_error_rad,
+            "mesh_error_rad": r.mesh_error_rad,
             "largest_deflection_rad": r.largest_deflection_rad,
             "silhouette_error_px": r.silhouette_error_px,
             "levels": r.levels,

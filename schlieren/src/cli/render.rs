@@ -187,6 +187,7 @@ pub(super) fn render_and_write(
         "tolerance_rad": scene.march.tolerance_rad,
         "deflection_error_rad": r.deflection_error_rad,
         "resolution_error_rad": r.resolution_error_rad,
+        "mesh_error_rad": r.mesh_error_rad,
         "left_out": r.skip_report,
         "largest_deflection_rad": r.largest_deflection_rad,
         "levels": r.levels,

@@ -12,6 +12,7 @@
 //! [`load_cells`] makes [`crate::gas_on_cells::GasOnCells`] of the same values instead, without a
 //! lattice.
 
+mod cell_averages;
 mod contents;
 mod evaluate;
 mod lattice;
@@ -127,7 +128,9 @@ pub struct Options {
     pub depth: Option<Depth>,
     /// See [`resample::Options`].
     pub samples_per_axis: usize,
-    /// How values between the points of a mesh are computed when it is resampled.
+    /// How values between the points of a mesh are computed when it is resampled, and whether
+    /// averages over cells are taken as averages ([`Reconstruction::Cubic`]) or as the values in
+    /// their middles.
     pub reconstruction: Reconstruction,
     /// Standard deviation of the shock smoothing in nodes: 0 for none, 1 to 1.4 for shocks that are
     /// one cell wide.
@@ -270,6 +273,9 @@ pub fn from_dataset(data: &Dataset, options: &Options) -> Result<LoadedField, In
         let before = on.values.clone();
         resample::smooth(&mut on.values, on.lattice.dims, options.smoothing_nodes)?;
         report.smoothing_rms = rms_difference(&before, &on.values);
+        if !on.truncation.is_empty() {
+            resample::smooth(&mut on.truncation, on.lattice.dims, options.smoothing_nodes)?;
+        }
     }
 
     // Hidden points may have any value.
@@ -285,11 +291,15 @@ pub fn from_dataset(data: &Dataset, options: &Options) -> Result<LoadedField, In
     report.reference_n_minus_1 = background + d0;
     let eps = on.values.iter().map(|&d| ((f64::from(d) - d0) / n0) as f32).collect();
     let nodes = nodes_of(&on.marks, options, &mut report);
-    let lattice::LatticeValues { lattice, .. } = on;
+    let lattice::LatticeValues { lattice, mut truncation, .. } = on;
+    truncation.iter_mut().for_each(|t| *t /= n0 as f32);
     let unit = options.length_unit_m;
     let spacing_m = (lattice.spacing * unit).to_array();
     let eps = reference::continued(eps, lattice.dims, &on.marks, options);
-    let field = Field::new(lattice.dims, spacing_m, lattice.origin * unit, eps, n0, nodes)?;
+    let mut field = Field::new(lattice.dims, spacing_m, lattice.origin * unit, eps, n0, nodes)?;
+    if !truncation.is_empty() {
+        field = field.with_truncation(truncation)?;
+    }
     Ok(LoadedField { field, report })
 }
 

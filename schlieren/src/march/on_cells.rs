@@ -95,6 +95,8 @@ pub struct OnCells<'a> {
     low_m: DVec3,
     size_m: DVec3,
     typical_cell_m: f64,
+    /// Whether the values are those of polynomials of second degree.
+    to_second_degree: bool,
     /// Walkers that no thread uses now.
     walkers: Mutex<Vec<CellWalker<'a>>>,
     work: Arc<CellWork>,
@@ -117,9 +119,17 @@ impl<'a> OnCells<'a> {
             low_m,
             size_m: high_m - low_m,
             typical_cell_m: gas.cells().typical_cell(),
+            to_second_degree: false,
             walkers: Mutex::default(),
             work: Arc::default(),
         }
+    }
+
+    /// The same paths through less accurate values, which tell how accurate the mesh is
+    /// ([`datasets::resample::CellField::walker_to_second_degree`]).
+    #[must_use]
+    pub(crate) fn to_second_degree(self) -> OnCells<'a> {
+        OnCells { to_second_degree: true, ..self }
     }
 
     /// The work of all tracing so far.
@@ -202,7 +212,11 @@ impl<'a> OnCells<'a> {
     fn with_walker(&self, trace: impl FnOnce(&mut CellWalker<'a>, &mut CellCounters)) {
         let lock = || self.walkers.lock().unwrap_or_else(PoisonError::into_inner);
         let free = lock().pop();
-        let mut walker = free.unwrap_or_else(|| self.gas.cells().walker());
+        let cells = self.gas.cells();
+        let mut walker = free.unwrap_or_else(|| match self.to_second_degree {
+            true => cells.walker_to_second_degree(),
+            false => cells.walker(),
+        });
         let mut counters = CellCounters::default();
         trace(&mut walker, &mut counters);
         self.work.add(&counters);

@@ -6,21 +6,21 @@ use crate::interpolate::Interpolant;
 use crate::march::FieldCache;
 use crate::view::View;
 
-/// Part of the lattice's own error below which a march's error does not show.
+/// Part of the lattice's and the mesh's own error below which a march's error does not show.
 const HIDDEN: f64 = 0.1;
 
 /// Ratio of errors above which half the step did not help: it would be 1/4 by Verlet's order.
 const STALLED: f64 = 0.7;
 
 impl Plan {
-    /// Measures the error like [`Plan::measure_with`]. While it is above the tolerance, refines
+    /// Measures the error like [`Plan::measure_with`]. While the sum is above the tolerance, refines
     /// what the request leaves open: straight rays become bent ones, the interpolant becomes the
     /// spline, and steps become half as long. Where that no longer helps, single precision becomes
     /// the full march in `f64`.
     ///
     /// Returns the first plan that is within the tolerance, or the most accurate one. Also stops at
-    /// a tenth of the lattice's own error ([`MeasuredError::resolution_rad`]), because a better
-    /// march would not show. A tolerance of zero or below is as accurate as possible already.
+    /// a tenth of the lattice's own error ([`MeasuredError::resolution_rad`]) or the mesh's, because a
+    /// better march would not show. A tolerance of zero or below is as accurate as possible already.
     pub fn within_tolerance(
         self,
         field: &Field,
@@ -34,11 +34,9 @@ impl Plan {
         if tolerance <= 0.0 {
             return best;
         }
-        let resolution_rad = planned.resolution_rad;
-        let goal = match resolution_rad.is_finite() {
-            true => tolerance.max(HIDDEN * resolution_rad),
-            false => tolerance,
-        };
+        // What the flow's own error leaves of the tolerance.
+        let of_flow_rad = planned.of_flow_rad();
+        let goal = (tolerance - of_flow_rad).max(HIDDEN * of_flow_rad);
         let (mut plan, mut error, mut stalled) = (self, planned.max_rad, false);
         while error > goal {
             let Some(next) = plan.refined(field, stalled) else { break };
@@ -47,7 +45,7 @@ impl Plan {
             (plan, error) = (next, measured.0);
             if error < best.1.max_rad {
                 let (max_rad, rms_rad, rays) = measured;
-                best = (plan, MeasuredError { max_rad, rms_rad, resolution_rad, rays });
+                best = (plan, MeasuredError { max_rad, rms_rad, rays, ..best.1 });
             }
         }
         best

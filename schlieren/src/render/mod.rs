@@ -21,6 +21,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod accuracy_warning;
 mod apparent;
 mod expose;
 pub(crate) mod map;
@@ -204,6 +205,8 @@ pub struct Report {
     pub deflection_error_rad: Option<f64>,
     /// Estimated error of deflections due to the flow's own lattice.
     pub resolution_error_rad: Option<f64>,
+    /// Estimated error of deflections due to the mesh that the flow comes from.
+    pub mesh_error_rad: Option<f64>,
     /// Largest deflection through a pixel's centre, when there is a map.
     pub largest_deflection_rad: Option<f64>,
     /// Largest error of the bodies' silhouettes, because they are computed with straight rays.
@@ -244,6 +247,7 @@ impl Report {
         self.march.clone_from(&planned.description);
         self.deflection_error_rad = planned.error_rad;
         self.resolution_error_rad = planned.resolution_error_rad;
+        self.mesh_error_rad = planned.mesh_error_rad;
         self.warnings.extend(planned.warnings.iter().cloned());
     }
 }

@@ -1,6 +1,7 @@
 //! Plans light paths through the cells of a mesh: as few steps in each cell as the tolerance
 //! allows.
 
+use super::accuracy_warning::{ErrorPart, of_mesh, warning};
 use super::planned::{Choice, PlannedPaths};
 use crate::gas_on_cells::GasOnCells;
 use crate::march::OnCells;
@@ -34,7 +35,7 @@ pub(super) fn planned(
     tolerance_rad: f64,
     chosen: Steps,
 ) -> PlannedPaths<'_> {
-    let (mut steps, mut error_rad) = (STEPS[0], None);
+    let (mut steps, mut error_rad, mut mesh_error_rad) = (STEPS[0], None, None);
     if let Steps::Known(known) = chosen {
         steps = known;
     }
@@ -57,6 +58,14 @@ pub(super) fn planned(
                 break;
             }
         }
+        // Polynomials of another degree differ by the mesh's error; without polynomials, nothing
+        // tells it.
+        if gas.cells().has_polynomials() {
+            let mut exits = vec![Exit::UNDISTURBED; starts.len()];
+            let paths = OnCells::new(gas, view, quantities, steps).to_second_degree();
+            paths.trace_parallel(&starts, &mut exits);
+            mesh_error_rad = Some(compare(&traced[&steps], &exits).0);
+        }
     }
     let paths = OnCells::new(gas, view, quantities, steps);
     let per_cell = if steps == 1 { "one step".into() } else { format!("{steps} steps") };
@@ -65,13 +74,12 @@ pub(super) fn planned(
     let mut planned =
         PlannedPaths::new(Box::new(paths), description, None, &request, (Bend::Full, 1.0));
     planned.choice = Some(Choice::Cells { steps });
-    if let Some(error) = error_rad.filter(|e| *e > tolerance_rad) {
-        planned.warnings.push(format!(
-            "deflections are off by up to {error:.1e} rad, above the tolerance of \
-             {tolerance_rad:.1e} rad: the values change within a cell more than its steps follow; \
-             use a finer mesh or a larger tolerance (march.tolerance_rad)"
-        ));
+    if let Some(rad) = error_rad {
+        let cure = "the values change within a cell more than its steps follow".to_owned();
+        let steps = ErrorPart { what: "the march", rad, cure };
+        planned.warnings.extend(warning([steps, of_mesh(mesh_error_rad)], tolerance_rad));
     }
-    (planned.error_rad, planned.cell_work) = (error_rad, Some(work));
+    (planned.error_rad, planned.mesh_error_rad) = (error_rad, mesh_error_rad);
+    planned.cell_work = Some(work);
     planned
 }

@@ -41,6 +41,8 @@ pub struct FrameInfo {
     pub deflection_error_rad: Option<f64>,
     /// Estimated error of deflections due to the flow's own lattice.
     pub resolution_error_rad: Option<f64>,
+    /// Estimated error of deflections due to the mesh that the flow comes from.
+    pub mesh_error_rad: Option<f64>,
     /// Largest deflection through a pixel's centre.
     pub largest_deflection_rad: Option<f64>,
     /// Description of the march.

@@ -74,6 +74,7 @@ impl Geometry {
 struct Errors {
     march_rad: Option<f64>,
     resolution_rad: Option<f64>,
+    mesh_rad: Option<f64>,
 }
 
 pub(super) struct Worker {
@@ -374,6 +375,7 @@ impl Worker {
             Ok::<_, RenderError>(Errors {
                 march_rad: planned.error_rad,
                 resolution_rad: planned.resolution_error_rad,
+                mesh_rad: planned.mesh_error_rad,
             })
         })??;
         self.errors = Some((geometry.clone(), errors));
@@ -401,6 +403,7 @@ impl Worker {
             noise_max: noise.map(|n| f64::from(n.iter().fold(0.0f32, |m, v| m.max(*v)))),
             deflection_error_rad: errors.and_then(|e| e.march_rad),
             resolution_error_rad: errors.and_then(|e| e.resolution_rad),
+            mesh_error_rad: errors.and_then(|e| e.mesh_rad),
             largest_deflection_rad: Some(traced.map.largest_deflection_rad),
             march: r.march.clone(),
             levels: r.levels,

@@ -91,11 +91,16 @@ pub(crate) fn tetrahedra(n: usize) -> Dataset {
 
 /// Averages over the cells of a grid that is slightly uneven, so that it is resampled.
 pub(crate) fn cell_averages(n: usize) -> Dataset {
-    let axis = |i: usize| {
-        let t = i as f64 / n as f64;
-        t - 0.5 + 0.05 * (2.0 * std::f64::consts::PI * t).sin() / (2.0 * std::f64::consts::PI)
-    };
-    let line: Vec<f64> = (0..=n).map(axis).collect();
+    averages(n, |t| t - 0.5 + 0.05 * (std::f64::consts::TAU * t).sin() / std::f64::consts::TAU)
+}
+
+/// Averages over cells of equal size, which are a lattice.
+pub(crate) fn even_cell_averages(n: usize) -> Dataset {
+    averages(n, |t| t - 0.5)
+}
+
+fn averages(n: usize, axis: impl Fn(f64) -> f64) -> Dataset {
+    let line: Vec<f64> = (0..=n).map(|i| axis(i as f64 / n as f64)).collect();
     // The average of a bell is a product of differences of error functions.
     let mean = |i: usize| {
         let s = BLOB.sigma_m * std::f64::consts::SQRT_2;

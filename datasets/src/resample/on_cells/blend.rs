@@ -33,6 +33,15 @@ pub(super) fn set(shares: &mut [Share], i: usize, n: f64, gradient: DVec3) {
     }
 }
 
+/// The powers that are used of each polynomial.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Degree {
+    /// All.
+    Third,
+    /// Those up to the second degree ([`Expansion::parts_to_second_degree`]).
+    Second,
+}
+
 /// What a corner contributes.
 pub(super) struct Corner<'a> {
     /// Relative to the cell's origin.
@@ -74,7 +83,11 @@ const EMPTY: Group = Group {
 };
 
 impl Polynomials {
-    pub(super) fn prepare<'a>(&mut self, corners: impl ExactSizeIterator<Item = Corner<'a>>) {
+    pub(super) fn prepare<'a>(
+        &mut self,
+        corners: impl ExactSizeIterator<Item = Corner<'a>>,
+        degree: Degree,
+    ) {
         self.groups.clear();
         self.groups.resize(corners.len().div_ceil(LANES), EMPTY);
         self.linear = true;
@@ -89,7 +102,10 @@ impl Polynomials {
             group.value[l] = (corner.value - self.value) as f32;
             let Some(expansion) = corner.expansion else { continue };
             self.linear = false;
-            let parts = expansion.parts();
+            let parts = match degree {
+                Degree::Third => expansion.parts(),
+                Degree::Second => expansion.parts_to_second_degree(),
+            };
             for (lane, f) in group.frame.iter_mut().zip(parts.frame) {
                 lane[l] = f;
             }

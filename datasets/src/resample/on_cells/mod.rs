@@ -34,6 +34,7 @@ use super::mesh::{Corners, Mesh};
 use super::reconstruct::{Expansion, FitQuality, PointField, Reconstruction, first_at_place};
 use super::shape;
 use super::{ResampleError, Samples};
+use blend::Degree;
 use border::Border;
 use faces::Neighbours;
 use glam::DVec3;
@@ -228,6 +229,11 @@ impl CellField {
         &self.report
     }
 
+    /// Whether values between the points are those of polynomials.
+    pub fn has_polynomials(&self) -> bool {
+        !self.expansions.is_empty()
+    }
+
     /// Bounding box of all points.
     pub fn bounds(&self) -> (DVec3, DVec3) {
         self.mesh.bounds()
@@ -245,7 +251,14 @@ impl CellField {
 
     /// A walker, which one thread uses for many lines.
     pub fn walker(&self) -> CellWalker<'_> {
-        CellWalker::new(self)
+        CellWalker::new(self, Degree::Third)
+    }
+
+    /// A walker whose values differ from those of [`CellField::walker`] by the error that the mesh
+    /// itself makes, about: those of polynomials of second degree instead of third. See
+    /// [`super::ResampledField::truncation`].
+    pub fn walker_to_second_degree(&self) -> CellWalker<'_> {
+        CellWalker::new(self, Degree::Second)
     }
 
     /// The median of the values on those faces of the border that lie in the sides of the mesh's

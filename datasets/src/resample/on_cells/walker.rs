@@ -1,7 +1,7 @@
 //! Follows lines from cell to cell.
 
 use super::CellField;
-use super::blend::Share;
+use super::blend::{Degree, Share};
 use super::cell::PreparedCell;
 use super::faces::{HIDDEN, OUTSIDE};
 use super::shares::shares;
@@ -43,12 +43,13 @@ pub struct CellWalker<'a> {
     field: &'a CellField,
     kept: Vec<Option<Box<(u32, PreparedCell)>>>,
     shares: Vec<Share>,
+    degree: Degree,
 }
 
 impl<'a> CellWalker<'a> {
-    pub(super) fn new(field: &'a CellField) -> CellWalker<'a> {
+    pub(super) fn new(field: &'a CellField, degree: Degree) -> CellWalker<'a> {
         let kept = std::iter::repeat_with(|| None).take(KEPT).collect();
-        CellWalker { field, kept, shares: Vec::with_capacity(1) }
+        CellWalker { field, kept, shares: Vec::with_capacity(1), degree }
     }
 
     fn slot(&mut self, cell: u32) -> usize {
@@ -58,11 +59,11 @@ impl<'a> CellWalker<'a> {
             Some(kept) if kept.0 == cell => {}
             Some(kept) => {
                 kept.0 = cell;
-                kept.1.prepare(self.field, cell as usize);
+                kept.1.prepare(self.field, cell as usize, self.degree);
             }
             empty => {
                 let mut new = Box::new((cell, PreparedCell::default()));
-                new.1.prepare(self.field, cell as usize);
+                new.1.prepare(self.field, cell as usize, self.degree);
                 *empty = Some(new);
             }
         }

@@ -6,6 +6,7 @@ use super::neighbours::Neighbourhood;
 use super::polynomial::{TERMS, TERMS_TO_DEGREE, means, monomials};
 use crate::resample::mesh::Mesh;
 use glam::DVec3;
+use std::ops::Range;
 
 /// Number of the nearest values that a polynomial is fitted to, two for each unknown. (With 32, a
 /// power hangs on one value in some cells; with 56, nothing gains.)
@@ -28,6 +29,11 @@ const RESIDUAL: [f64; 2] = [0.1, 0.25];
 /// point, or points at a border, are no more. The residual of the polynomial of second degree on
 /// the same values counts too, times this.
 const QUADRATIC_SHARE: f64 = 0.7;
+
+/// Where a polynomial gives way, the error is larger than what is left of it adds: a step between
+/// two points may be anywhere between them. Of a shock that is half as thick as a tetrahedron is
+/// wide, deflections are 7 times the difference that this makes once.
+const UNRESOLVED: f64 = 3.0;
 
 /// Number of samples that limit a gradient: on a cubic grid, those that share a cell.
 const ADJACENT: usize = 26;
@@ -91,6 +97,22 @@ impl Expansion {
         }
     }
 
+    /// The numbers of a polynomial whose difference from this one is the second of
+    /// [`Expansion::parts_at`].
+    pub(in crate::resample) fn parts_to_second_degree(&self) -> Parts {
+        let mut parts = self.parts();
+        if self.is_whole() {
+            parts.terms[TERMS_TO_DEGREE[2]..].fill(0.0);
+            return parts;
+        }
+        let factor = (1.0 - UNRESOLVED) as f32;
+        parts.terms.iter_mut().for_each(|c| *c *= factor);
+        parts.constant *= factor;
+        let [low, high] = parts.bounds;
+        parts.bounds = [factor * high, factor * low];
+        parts
+    }
+
     pub(super) fn state(&self) -> State {
         self.state
     }
@@ -103,10 +125,23 @@ impl Expansion {
     /// The value at distance `d` from the point, whose own value is `value`.
     #[inline]
     pub(super) fn at(&self, value: f64, d: DVec3) -> f64 {
+        value + self.parts_at(d)[0]
+    }
+
+    /// What is added to the point's value at distance `d`, and the part of it that a less accurate
+    /// polynomial would leave out: the third powers, or [`UNRESOLVED`] times all where the
+    /// polynomial is not whole.
+    #[inline]
+    pub(super) fn parts_at(&self, d: DVec3) -> [f64; 2] {
         let terms = monomials(in_frame(&self.frame, d));
-        let sum: f64 = self.terms.iter().zip(terms).map(|(c, m)| f64::from(*c) * m).sum();
-        let change = f64::from(self.constant) + sum;
-        value + change.clamp(f64::from(self.low), f64::from(self.high))
+        let add = |from: f64, range: Range<usize>| {
+            let terms = self.terms[range.clone()].iter().zip(&terms[range]);
+            terms.fold(from, |sum, (c, m)| sum + f64::from(*c) * m)
+        };
+        let change = f64::from(self.constant) + add(0.0, 0..TERMS);
+        let third = add(0.0, TERMS_TO_DEGREE[2]..TERMS);
+        let change = change.clamp(f64::from(self.low), f64::from(self.high));
+        [change, if self.is_whole() { third } else { UNRESOLVED * change }]
     }
 }
 

@@ -109,18 +109,30 @@ impl<'a> PointField<'a> {
         PointField { values, expansions: fitted(mesh, fit) }
     }
 
+    /// Whether there are no polynomials.
+    pub(super) fn is_linear(&self) -> bool {
+        self.expansions.is_empty()
+    }
+
     /// The polynomials alone.
     pub(super) fn into_expansions(self) -> Vec<Expansion> {
         self.expansions
     }
 
-    /// The value at `p` in the cell with these corners, from the weights of its element.
-    pub(super) fn at(&self, mesh: &Mesh, corners: &[u32], weights: &[f64], p: DVec3) -> f64 {
-        let mut sum = 0.0;
+    /// The value at `p` in the cell with these corners, from the weights of its element, and the
+    /// part of it that less accurate polynomials would leave out ([`Expansion::parts_at`]).
+    pub(super) fn at(&self, mesh: &Mesh, corners: &[u32], weights: &[f64], p: DVec3) -> [f64; 2] {
+        let mut sum = [0.0; 2];
         for (&id, &weight) in corners.iter().zip(weights) {
             // 0 · NaN is NaN: a corner without weight must not affect the value.
             if weight != 0.0 {
-                sum += weight * self.of_corner(mesh, id as usize, p);
+                let (id, value) = (id as usize, self.values[id as usize]);
+                let [change, last] = match self.expansions.get(id) {
+                    Some(expansion) => expansion.parts_at(p - mesh.point(id)),
+                    None => [0.0; 2],
+                };
+                sum[0] += weight * (value + change);
+                sum[1] += weight * last;
             }
         }
         sum

@@ -270,3 +270,26 @@ fn few_points_and_flat_meshes_give_the_values_of_the_elements() {
         assert!((f64::from(*v) - linear(p)).abs() < 1e-6, "{p}: {v}");
     }
 }
+
+/// What the last degree adds is nothing where it is not needed, and larger than the error where it
+/// is.
+#[test]
+fn truncation_is_nothing_for_quadratic_fields_and_above_the_error_of_a_bell() {
+    let mesh = Mesh::new(&tetrahedra(13, waved(13, 0.02))).unwrap();
+    let on = |f: fn(DVec3) -> f64, how| {
+        let (values, lattice) = (at_points(&mesh, f), cube_lattice(25));
+        let options = Options { reconstruction: how, ..Options::default() };
+        resample(&mesh, Samples::Points(&values), &lattice, &options).unwrap()
+    };
+    let largest = |t: &[f32]| t.iter().fold(0.0f64, |m, t| m.max(f64::from(t.abs())));
+    let smooth = on(quadratic, Reconstruction::Cubic);
+    assert!(largest(&smooth.truncation) < 1e-5, "{}", largest(&smooth.truncation));
+    let of_bell = on(bell, Reconstruction::Cubic);
+    let error = worst(&of_bell, 0.0, bell);
+    let truncation = largest(&of_bell.truncation);
+    assert!(error < truncation && truncation < 20.0 * error, "{error} {truncation}");
+    let step = |p: DVec3| f64::from(u8::from(p.x + 0.3 * p.y > 0.6));
+    // Where no polynomial fits, all that is added to the elements counts.
+    assert!(largest(&on(step, Reconstruction::Cubic).truncation) > 0.05);
+    assert!(on(step, Reconstruction::Linear).truncation.is_empty());
+}

@@ -59,6 +59,7 @@ function onFrame(frame) {
     ["largest deflection", quantity(info.largest_deflection_rad, "rad")],
     ["error of deflections", info.deflection_error_rad === null ? "when finished" : `± ${quantity(info.deflection_error_rad, "rad", 2)}`],
     ["error of the flow's lattice", info.resolution_error_rad === null ? "–" : `± ${quantity(info.resolution_error_rad, "rad", 2)}`],
+    ...(info.mesh_error_rad === null ? [] : [["error of the flow's mesh", `± ${quantity(info.mesh_error_rad, "rad", 2)}`]]),
     ["pixel", quantity(info.pixel_m, "m")],
     ["brightness", `${percent(info.levels[0], 3)} to ${percent(info.levels[1], 3)}`],
     ["light along", angles ? `azimuth ${Math.round(angles[0] * 10) / 10}°, elevation ${Math.round(angles[1] * 10) / 10}°` : "–"],
