@@ -13,6 +13,7 @@
 //! [`Mark`] classifies a node. [`Report`] measures the loss of accuracy by sampling the lattice
 //! back at the points of the mesh.
 
+mod beyond_border;
 mod extrude;
 mod mesh;
 mod on_cells;
@@ -22,13 +23,16 @@ mod report;
 mod revolve;
 mod shape;
 mod smooth;
+mod walls;
 
+pub use beyond_border::in_bodies;
 pub use mesh::{Mesh, Plane};
 pub use on_cells::{Beyond, CellField, CellReport, CellWalker, Entry};
 pub use reconstruct::{FitQuality, Reconstruction};
 pub use report::{Report, ResamplingError};
 pub use revolve::{revolve, revolved_bounds};
 pub use smooth::smooth;
+pub use walls::Walls;
 
 use crate::model::ModelError;
 use glam::DVec3;
