@@ -15,6 +15,7 @@
 
 mod beyond_border;
 mod extrude;
+mod jumps;
 mod mesh;
 mod on_cells;
 mod rasterize;
@@ -26,6 +27,7 @@ mod smooth;
 mod walls;
 
 pub use beyond_border::in_bodies;
+pub use jumps::{JumpReport, average_jumps};
 pub use mesh::{Mesh, Plane};
 pub use on_cells::{Beyond, CellField, CellReport, CellWalker, Entry};
 pub use reconstruct::{FitQuality, Reconstruction};
@@ -178,6 +180,10 @@ impl Lattice {
     /// Number of nodes.
     pub fn len(&self) -> usize {
         self.dims.iter().product()
+    }
+    /// Size of the box of the nodes.
+    pub fn size(&self) -> DVec3 {
+        self.spacing * DVec3::from_array(self.dims.map(|d| d.saturating_sub(1) as f64))
     }
     /// Always false: a lattice has nodes.
     pub fn is_empty(&self) -> bool {
