@@ -5,7 +5,7 @@
 use datasets::model::{DataArray, Dataset, ImageData, Values};
 use glam::DVec3;
 use schlieren::input::{LoadedField, Medium, Options, Quantity, Reference, from_dataset};
-use schlieren::path::{Exit, LightPaths, Start};
+use schlieren::path::{Exit, Start};
 use schlieren::plan::{Plan, Request};
 use schlieren::view::{Axis, View};
 

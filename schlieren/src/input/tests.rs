@@ -1,4 +1,5 @@
 use super::*;
+use crate::field::Node;
 use crate::index::ciddor::{Ciddor, MoistAir};
 use crate::index::multifield::{Rule, TransferFunction};
 use datasets::model::{
