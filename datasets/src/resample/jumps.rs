@@ -328,18 +328,21 @@ mod tests {
 
     #[test]
     fn an_oblique_front_bends_light_as_its_slope_says_at_all_angles() {
+        let mut worst_points = 0.0f64;
         for n in [48, 96] {
             for slope in [0.21, 0.37, 0.5, 0.73, 0.95, 1.05, 1.41, 2.0, 2.7] {
                 for offset in [0.0, 0.31] {
                     let [points, averaged] = errors(slope, n, offset);
                     assert!(averaged < 0.06, "{n} {slope}: {averaged}");
+                    worst_points = worst_points.max(points);
                 }
             }
         }
+        assert!(worst_points > 0.4, "{worst_points}");
     }
 
     #[test]
-    fn smooth_fields_and_averages_keep_their_bits() {
+    fn smooth_fields_keep_their_bits_and_averages_nearly() {
         let n = 40;
         let dims = [n, n, 4];
         let smooth = |i: usize| {
@@ -350,12 +353,12 @@ mod tests {
             let x = (i % n) as f64 - 14.2 - 0.4 * (i / n % n) as f64;
             part_behind(x, [0.4, 0.0]) as f32
         };
-        for field in [&smooth as &dyn Fn(usize) -> f32, &averaged] {
+        for (field, most) in [(&smooth as &dyn Fn(usize) -> f32, 0.0), (&averaged, 0.12)] {
             let mut values: Vec<f32> = (0..n * n * 4).map(field).collect();
             let before = values.clone();
             average_jumps(&mut values, dims).unwrap();
             let worst = values.iter().zip(&before).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
-            assert!(worst < 0.12, "{worst}");
+            assert!(worst <= most, "{worst}");
         }
         let mut hole = vec![1.0f32; n * n * 4];
         hole[5 * n + 5] = f32::NAN;
