@@ -16,12 +16,14 @@ pub mod lines;
 mod merge;
 pub mod polygon;
 pub mod surface;
+mod wall_names;
 
 pub use array::{Attributes, DataArray, Endian, ScalarType, Values};
 pub use cells::{CellType, Cells};
 pub use coloring::ColorBy;
 pub use lines::{PointSet, Polyline};
 pub use surface::SurfaceReport;
+pub use wall_names::{WALL_POINTS, is_name_of_body};
 
 use glam::{DMat3, DVec3};
 

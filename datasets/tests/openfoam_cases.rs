@@ -3,7 +3,7 @@
 mod peer;
 mod sample_files;
 
-use datasets::model::{Dataset, UnstructuredGrid};
+use datasets::model::{Dataset, UnstructuredGrid, WALL_POINTS};
 use datasets::read::openfoam::BOUNDARY_PATCHES;
 use datasets::read::{LoadedFile, OpenOptions, open, open_with};
 use datasets::resample::{Mesh, Plane};
@@ -34,6 +34,8 @@ fn text_binary_and_zipped_cases_are_the_same_data() {
     assert_eq!((array("p").tuples(), array("p").get(1, 0)), (3, 1e5));
     let patches = g.attributes.text.iter().find(|t| t.0 == BOUNDARY_PATCHES).unwrap();
     assert_eq!(patches.1, ["inlet patch 1", "outlet patch 1", "walls wall 6", "sides patch 6"]);
+    // All points of the mesh belong to a face of `walls`.
+    assert_eq!(g.attributes.field_array(WALL_POINTS).unwrap().tuples(), 16);
     let warned = text.warnings.join("\n");
     assert!(warned.contains("t = 0.25") && warned.contains("phi (surfaceScalarField)"), "{warned}");
     for form in [Form::Binary, Form::Zipped] {

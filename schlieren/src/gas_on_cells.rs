@@ -18,6 +18,7 @@ pub struct GasOnCells {
     n0: f64,
     pub(crate) outside: Node,
     pub(crate) hidden: Node,
+    pub(crate) walls: Node,
     at_rest: bool,
 }
 
@@ -32,7 +33,15 @@ impl GasOnCells {
         outside: Node,
         hidden: Node,
     ) -> GasOnCells {
-        GasOnCells { cells: Arc::new(cells), reference, n0, outside, hidden, at_rest: false }
+        let (cells, walls) = (Arc::new(cells), outside);
+        GasOnCells { cells, reference, n0, outside, hidden, walls, at_rest: false }
+    }
+
+    /// The same gas, with this behind those faces of the border that are walls. It is what is
+    /// outside by default.
+    #[must_use]
+    pub fn with_walls(self, walls: Node) -> GasOnCells {
+        GasOnCells { walls, ..self }
     }
 
     /// The same cells, with the reference medium in all of them.

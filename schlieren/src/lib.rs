@@ -45,6 +45,7 @@ pub mod analytic;
 pub mod cli;
 pub mod cutoff;
 mod derivative_bounds;
+pub mod drawing;
 pub mod field;
 pub mod film;
 pub mod filter;
@@ -67,6 +68,7 @@ pub mod render;
 pub mod scene;
 #[cfg(feature = "serve")]
 pub mod serve;
+pub mod sheet;
 pub mod skip;
 pub mod solids;
 pub mod spectrum;

@@ -1,10 +1,13 @@
 //! Writes images to files: PNG for viewing, OpenEXR with every layer and parameter, and NumPy for
 //! the deflection map.
 
+use crate::cutoff::Rgb;
+use crate::drawing::Canvas;
 #[cfg(doc)]
 use crate::render::Map;
-use crate::render::RenderOutput;
+use crate::render::{RenderOutput, Report};
 use crate::scene::{Scene, SceneError};
+use crate::sheet::Sheet;
 use datasets::image_io::{self, ImageError, LayeredImage, Metadata, PngDepth, PngReport, keys};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -45,7 +48,7 @@ pub fn encode_png(rendered: &RenderOutput) -> Result<(Vec<u8>, PngReport), Outpu
 
 fn picture(rendered: &RenderOutput) -> Result<LayeredImage, OutputError> {
     let mut image = LayeredImage::new(rendered.framing.width, rendered.framing.height);
-    add_pixels(&mut image, rendered)?;
+    add_colors(&mut image, "", &rendered.pixels, rendered.colored)?;
     Ok(image)
 }
 
@@ -78,10 +81,66 @@ pub fn write_exr(
     Ok(image_io::write_exr(path, &image)?)
 }
 
+/// Writes a drawn picture as sRGB with 8 bits per channel.
+pub fn write_canvas(path: &Path, canvas: &Canvas) -> Result<PngReport, OutputError> {
+    let mut image = LayeredImage::new(canvas.width as u32, canvas.height as u32);
+    add_colors(&mut image, "", &canvas.pixels, true)?;
+    Ok(image_io::write_png(path, &image, PngDepth::Eight)?)
+}
+
+/// Writes the panels of a sheet as layers: `NAME.R`, `.G`, `.B` or `NAME.Y`; `deflection`,
+/// `displacement` (of BOS dots), `phase.Y` and `transmission.Y` as in [`write_exr`].
+pub fn write_sheet_exr(
+    path: &Path,
+    sheet: &Sheet,
+    scene: &Scene,
+    elapsed_secs: f64,
+) -> Result<(), OutputError> {
+    let mut image = LayeredImage::new(sheet.framing.width, sheet.framing.height);
+    for panel in &sheet.panels {
+        if let Some(pixels) = &panel.pixels {
+            let colored = pixels.iter().any(|p| p[0] != p[1] || p[0] != p[2]);
+            add_colors(&mut image, &format!("{}.", panel.name), pixels, colored)?;
+        }
+    }
+    let dots = sheet.background_map.as_ref().map_or(&[][..], |m| &m.apparent_m);
+    let m = &sheet.map;
+    for (axis, name) in ["X", "Y"].into_iter().enumerate() {
+        let of = |v: &[[f32; 2]]| v.iter().map(|d| d[axis]).collect::<Vec<f32>>();
+        image.add(&format!("deflection.{name}"), "rad", of(&m.deflection_rad))?;
+        if !dots.is_empty() {
+            image.add(&format!("displacement.{name}"), "m", of(dots))?;
+        }
+    }
+    image.add("phase.Y", "waves", m.waves.clone())?;
+    image.add("transmission.Y", "1", m.transmission.clone())?;
+    image.metadata = metadata_of(&sheet.report, scene, elapsed_secs)?;
+    for panel in sheet.panels.iter().filter(|p| p.pixels.is_some()) {
+        let text = format!("{}; {}", panel.labels.join(": "), panel.options.join(" "));
+        image.metadata.insert(format!("panel {}", panel.name), text.into());
+    }
+    Ok(image_io::write_exr(path, &image)?)
+}
+
+fn add_colors(
+    image: &mut LayeredImage,
+    prefix: &str,
+    pixels: &[Rgb],
+    colored: bool,
+) -> Result<(), OutputError> {
+    let names: &[(usize, &str)] =
+        if colored { &[(0, "R"), (1, "G"), (2, "B")] } else { &[(0, "Y")] };
+    for (c, name) in names {
+        let channel = pixels.iter().map(|v| v[*c]).collect();
+        image.add(&format!("{prefix}{name}"), "", channel)?;
+    }
+    Ok(())
+}
+
 /// Collects all rendered layers as planes.
 pub fn layers(rendered: &RenderOutput) -> Result<LayeredImage, OutputError> {
     let mut image = LayeredImage::new(rendered.framing.width, rendered.framing.height);
-    add_pixels(&mut image, rendered)?;
+    add_colors(&mut image, "", &rendered.pixels, rendered.colored)?;
     if let Some(m) = &rendered.map {
         for (axis, name) in ["X", "Y"].into_iter().enumerate() {
             let of = |v: &[[f32; 2]]| v.iter().map(|d| d[axis]).collect();
@@ -118,24 +177,16 @@ pub fn layers(rendered: &RenderOutput) -> Result<LayeredImage, OutputError> {
     Ok(image)
 }
 
-fn add_pixels(image: &mut LayeredImage, rendered: &RenderOutput) -> Result<(), OutputError> {
-    let channel = |c: usize| rendered.pixels.iter().map(|v| v[c]).collect();
-    if rendered.colored {
-        for (c, name) in ["R", "G", "B"].into_iter().enumerate() {
-            image.add(name, "", channel(c))?;
-        }
-    } else {
-        image.add("Y", "", channel(0))?;
-    }
-    Ok(())
-}
-
 /// Collects every parameter and a report of the run.
 pub fn metadata(
     rendered: &RenderOutput,
     scene: &Scene,
     elapsed_secs: f64,
 ) -> Result<Metadata, OutputError> {
+    metadata_of(&rendered.report, scene, elapsed_secs)
+}
+
+fn metadata_of(r: &Report, scene: &Scene, elapsed_secs: f64) -> Result<Metadata, OutputError> {
     let mut m = image_io::metadata_of_this_run("schlieren", env!("CARGO_PKG_VERSION"));
     // OpenEXR reserves the attribute of that name.
     if let Some(program) = m.remove(keys::SOFTWARE) {
@@ -147,7 +198,6 @@ pub fn metadata(
         flatten("", &toml::Value::Table(table), &mut m);
     }
     m.insert("scene".into(), text.into());
-    let r = &rendered.report;
     m.insert("pixel_m".into(), r.pixel_m.into());
     m.insert("march_in_effect".into(), r.march.clone().into());
     m.insert("rays".into(), (r.counters.rays as f64).into());
@@ -188,8 +238,25 @@ fn flatten(path: &str, value: &toml::Value, out: &mut Metadata) {
 /// rad along the image's right and up. Row 0 is the top.
 pub fn write_npy(path: &Path, rendered: &RenderOutput) -> Result<(), OutputError> {
     let map = rendered.map.as_ref().ok_or(OutputError::NoMap)?;
+    write_vectors(path, rendered, &map.deflection_rad)
+}
+
+/// Writes the displacement as a NumPy array of shape (height, width, 2), little-endian f32, in m
+/// along the image's right and up: for BOS that of the dots ([`Map::apparent_m`]), otherwise that
+/// of the rays.
+pub fn write_displacement(path: &Path, rendered: &RenderOutput) -> Result<(), OutputError> {
+    let map = rendered.map.as_ref().ok_or(OutputError::NoMap)?;
+    let dots = !map.apparent_m.is_empty();
+    write_vectors(path, rendered, if dots { &map.apparent_m } else { &map.displacement_m })
+}
+
+fn write_vectors(
+    path: &Path,
+    rendered: &RenderOutput,
+    vectors: &[[f32; 2]],
+) -> Result<(), OutputError> {
     let shape = format!("({}, {}, 2)", rendered.framing.height, rendered.framing.width);
-    let bytes = npy(&shape, map.deflection_rad.as_flattened());
+    let bytes = npy(&shape, vectors.as_flattened());
     write_whole(path, &bytes).map_err(|source| OutputError::Io { path: path.into(), source })
 }
 

@@ -132,6 +132,10 @@ impl<T: LightPaths + Send + ?Sized> LightPaths for std::sync::Arc<T> {
         (**self).skip_report()
     }
 
+    fn rays_at_once(&self) -> Option<usize> {
+        (**self).rays_at_once()
+    }
+
     fn trace_with_jacobians(
         &self,
         starts: &[Start],
@@ -161,6 +165,13 @@ pub trait LightPaths: Sync {
 
     /// The quantities that [`Exit`] will hold.
     fn quantities(&self) -> PathQuantities;
+
+    /// How many rays to trace in one call where the caller may be cancelled: a multiple of every
+    /// packet size. Rays through millions of cells take milliseconds each. `None` where rays are
+    /// faster the more there are, as on a GPU.
+    fn rays_at_once(&self) -> Option<usize> {
+        Some(256)
+    }
 
     /// The distance over which [`LightPaths::trace_with_jacobians`] may take differences, about
     /// half a voxel.

@@ -217,7 +217,7 @@ fn a_hole_is_what_its_role_says_and_rays_enter_again_behind_it() {
     for (role, status) in
         [(Role::Blank, Status::Masked), (Role::Solid, Status::Blocked), (Role::Gas, Status::Free)]
     {
-        let gas = gas(&with_hole(), &Options { outside: role, ..absolute() });
+        let gas = gas(&with_hole(), &Options { outside: role.into(), ..absolute() });
         let exits = traced(&gas, View::along(Axis::Z, DVec3::ZERO), &starts);
         for (exit, through) in exits.iter().zip(through) {
             let expected = if through { status } else { Status::Free };
@@ -240,8 +240,8 @@ fn rays_that_miss_the_mesh_are_undisturbed_and_the_box_counts_as_outside() {
     let view = View::along(Axis::Z, DVec3::ZERO);
     let start = |x: f32, y: f32| Start { position_m: [x, y], tilt_rad: [0.0; 2] };
     let starts = [start(0.0, 0.0), start(0.3, 0.0), start(0.45, 0.45), start(0.6, 0.0)];
-    let of = |outside| {
-        let gas = gas(&data, &Options { outside, ..absolute() });
+    let of = |outside: Role| {
+        let gas = gas(&data, &Options { outside: outside.into(), ..absolute() });
         traced(&gas, view, &starts).iter().map(|e| e.status).collect::<Vec<_>>()
     };
     use Status::{Free, Masked};

@@ -5,7 +5,7 @@
 use datasets::resample::Resolution;
 use glam::DVec3;
 use schlieren::field::Node;
-use schlieren::input::{Depth, LoadedField, Medium, Options, Quantity, Role, load};
+use schlieren::input::{Depth, LoadedField, Medium, Options, Outside, Quantity, load};
 use schlieren::measure::{Mark, Photograph, SearchFrom};
 use schlieren::render::{Control, Layers, TestSection, render};
 use schlieren::scene::Scene;
@@ -55,7 +55,7 @@ fn blunt_fin_has_its_bow_shock_where_theory_puts_it() {
     let options = Options {
         bounds: Some([DVec3::new(-1.5, 0.0, 1.0), DVec3::new(0.5, 1.0, 5.5)]),
         resolution: Resolution::Spacing(0.025),
-        outside: Role::Solid,
+        outside: Outside::Solid,
         ..Options::new(medium)
     };
     let LoadedField { field, report } = load(&path, &options).unwrap();
@@ -102,7 +102,7 @@ fn blunt_fin_stand_off_is_measured_in_our_schlieren_image() {
         bounds: Some([DVec3::new(-1.5, 0.0, 1.0), DVec3::new(0.3, 1.5, 5.7)]),
         resolution: Resolution::Spacing(0.03),
         length_unit_m: 0.02,
-        outside: Role::Solid,
+        outside: Outside::Solid,
         ..Options::new(Medium::Density {
             density: Quantity::array("Density").scaled(stream),
             species: vec![],

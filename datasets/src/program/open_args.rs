@@ -10,10 +10,11 @@ pub(super) struct OpenArgs {
     /// [default: the last of an OpenFOAM case, otherwise the first]
     #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
     time: Option<f64>,
-    /// Distance between the points of a NumPy array, or of a NetCDF file without coordinates
+    /// Distance between the points of a file that does not say it: NumPy, raw, NRRD, MetaImage,
+    /// NetCDF without coordinates
     #[arg(long, value_name = "DX,DY,DZ", value_parser = three)]
     spacing: Option<[f64; 3]>,
-    /// Position of the first point of a NumPy array, or of a NetCDF file without coordinates
+    /// Position of the first point of such a file
     #[arg(long, value_name = "X,Y,Z", value_parser = three, allow_hyphen_values = true)]
     origin: Option<[f64; 3]>,
 }

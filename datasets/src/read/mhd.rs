@@ -4,7 +4,7 @@
 
 use super::error::{At, BROKEN, Cursor, Fault, read_bytes, sibling_path};
 use super::volume::{Packing, Volume};
-use super::{Content, LoadedFile, ReadError};
+use super::{Content, LoadedFile, OpenOptions, ReadError};
 use crate::model::{Endian, ScalarType};
 use glam::{DMat3, DVec3};
 use std::collections::BTreeMap;
@@ -14,7 +14,23 @@ pub(crate) const FORMAT: &str = "MetaImage";
 
 /// Reads a `.mha` file, or a `.mhd` header with its data file.
 pub fn read(path: &Path) -> Result<LoadedFile, ReadError> {
-    read_from_bytes(path, &read_bytes(path)?)
+    read_with(path, &OpenOptions::default())
+}
+
+/// As [`read`], with the spacing and origin of a file that has none.
+pub(super) fn read_with(path: &Path, options: &OpenOptions) -> Result<LoadedFile, ReadError> {
+    let fault = |f: Fault| f.in_file(path, FORMAT);
+    let bytes = read_bytes(path)?;
+    let (header, _) = Header::parse(&bytes).map_err(fault)?;
+    let has_place = ["ElementSpacing", "ElementSize", "Offset", "Position", "Origin"]
+        .iter()
+        .any(|k| header.get(k).is_some());
+    if has_place {
+        options.refuse_lattice().map_err(fault)?;
+    }
+    let mut file = read_from_bytes(path, &bytes)?;
+    options.place(&mut file).map_err(fault)?;
+    Ok(file)
 }
 
 /// Reads the content of a file; the data file is resolved relative to `path`.

@@ -128,7 +128,9 @@ pub fn open_with(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Loaded
             }
         }
     };
-    if !matches!(format, Format::Numpy | Format::NetCdf) {
+    let takes_lattice =
+        [Format::Numpy, Format::NetCdf, Format::Nrrd, Format::MetaImage, Format::Raw];
+    if !takes_lattice.contains(&format) {
         options.refuse_lattice().map_err(|f| f.in_file(path, format.name()))?;
     }
     if !format.may_have_times() {
@@ -142,9 +144,9 @@ pub fn open_with(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Loaded
         Format::NetCdf => netcdf::read(path, options),
         Format::Xdmf => xdmf::read(path, options),
         Format::Plot3d => plot3d::read(path, &plot3d::Plot3dOptions::default()),
-        Format::Nrrd => nrrd::read(path),
-        Format::MetaImage => mhd::read(path),
-        Format::Raw => raw::read(path),
+        Format::Nrrd => nrrd::read_with(path, options),
+        Format::MetaImage => mhd::read_with(path, options),
+        Format::Raw => raw::read_with(path, options),
         Format::Numpy => npy::read(path, options),
         Format::Obj => obj::read(path),
         Format::Gltf => gltf::read(path),

@@ -1,7 +1,9 @@
 //! What a caller can say about a file that the file itself does not hold.
 
-use super::TimeStep;
 use super::error::{At, Fault};
+use super::{Content, LoadedFile, TimeStep};
+use crate::model::Dataset;
+use glam::DVec3;
 
 /// Options of [`super::open_with`]. Each is refused by formats to which it means nothing.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -9,10 +11,10 @@ pub struct OpenOptions {
     /// The time to read from a file or folder with several, in the unit of the program that wrote
     /// it. Without it, the last time of an OpenFOAM case is read, and the first of others.
     pub time: Option<f64>,
-    /// Distance between points along x, y and z, for NumPy arrays and NetCDF files without
-    /// coordinates.
+    /// Distance between points along x, y and z, for NumPy arrays, raw volumes, and NRRD,
+    /// MetaImage and NetCDF files without coordinates.
     pub spacing: Option<[f64; 3]>,
-    /// Position of the first point, for NumPy arrays and NetCDF files without coordinates.
+    /// Position of the first point, for the same files.
     pub origin: Option<[f64; 3]>,
 }
 
@@ -25,6 +27,25 @@ impl OpenOptions {
             _ => return Ok(()),
         };
         Err(refused(name, format!("{value:?}"), "the file has its own coordinates: leave it out"))
+    }
+
+    /// Places the lattice of a file that does not say where it is.
+    pub(crate) fn place(&self, file: &mut LoadedFile) -> Result<(), Fault> {
+        let finite = |v: Option<[f64; 3]>| v.is_none_or(|v| v.iter().all(|x| x.is_finite()));
+        let positive = |v: Option<[f64; 3]>| v.is_none_or(|v| v.iter().all(|x| *x > 0.0));
+        if !finite(self.spacing) || !positive(self.spacing) {
+            let value = format!("{:?}", self.spacing.unwrap_or_default());
+            return Err(refused("spacing", value, "give finite numbers above 0"));
+        }
+        if !finite(self.origin) {
+            let value = format!("{:?}", self.origin.unwrap_or_default());
+            return Err(refused("origin", value, "give finite numbers"));
+        }
+        if let Content::Data(Dataset::ImageData(image)) = &mut file.content {
+            image.spacing = self.spacing.map_or(image.spacing, DVec3::from_array);
+            image.origin = self.origin.map_or(image.origin, DVec3::from_array);
+        }
+        Ok(())
     }
 
     /// A fault if there is a time.

@@ -18,7 +18,7 @@
 
 use super::error::{At, BROKEN, Fault, io_error, read_bytes};
 use super::volume::Volume;
-use super::{Content, LoadedFile, ReadError};
+use super::{Content, LoadedFile, OpenOptions, ReadError};
 use crate::model::{Endian, ScalarType};
 use glam::{DMat3, DVec3};
 use serde::Deserialize;
@@ -73,6 +73,13 @@ fn one() -> [f64; 3] {
 }
 fn one_component() -> u64 {
     1
+}
+
+/// As [`read`], with a spacing and an origin that count more than the description's.
+pub(super) fn read_with(path: &Path, options: &OpenOptions) -> Result<LoadedFile, ReadError> {
+    let mut file = read(path)?;
+    options.place(&mut file).map_err(|f| f.in_file(path, FORMAT))?;
+    Ok(file)
 }
 
 /// Reads a raw volume; `path` is the file with the numbers or its description.

@@ -53,6 +53,12 @@ pub(super) fn has_only_polygons(d: &UnstructuredGrid) -> bool {
     kinds().any(polygon) && !kinds().any(solid)
 }
 
+/// Whether no cell fills space.
+pub(super) fn has_no_solids(d: &UnstructuredGrid) -> bool {
+    let solid = |t: &u8| matches!(CellType::of(*t), CellType::Solid(_) | CellType::Polyhedron);
+    !d.types.iter().any(solid)
+}
+
 /// The normal of the plane of all polygons; `None` if they do not lie in one.
 fn plane_normal(d: &UnstructuredGrid, polygons: &[(u32, Vec<u32>)]) -> Option<DVec3> {
     let at = |id: u32| d.points.get(id as usize);

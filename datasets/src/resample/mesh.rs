@@ -1,9 +1,12 @@
 //! Represents any data set as points and solid cells, numbered consecutively over all blocks.
 //! Lattices keep their implicit cells.
 
+mod layers;
+
 use super::{ResampleError, extrude};
 use crate::model::{Attributes, CellType, Dataset, Points, UnstructuredGrid, extent_dims};
 use glam::DVec3;
+use layers::{flat_source, hidden_cells_of_lattice, plane_normal};
 use rayon::prelude::*;
 use rt_core::math::median_high;
 use std::ops::Range;
@@ -548,53 +551,4 @@ impl Explicit {
             }
         }
     }
-}
-
-/// For a lattice with a second layer along `axis`: the corresponding point of the flat lattice, and
-/// its side.
-fn flat_source(i: usize, dims: [usize; 3], axis: usize) -> (usize, usize) {
-    let mut at = [i % dims[0], i / dims[0] % dims[1], i / dims[0] / dims[1]];
-    let mut n = dims;
-    let side = std::mem::take(&mut at[axis]);
-    n[axis] = 1;
-    (at[0] + n[0] * (at[1] + n[1] * at[2]), side)
-}
-
-/// Unit normal of a plane lattice: the direction of the summed normals of its quads.
-fn plane_normal(points: &[DVec3], dims: [usize; 3], axis: usize) -> DVec3 {
-    let (a, b) = ((axis + 1) % 3, (axis + 2) % 3);
-    let stride = [1, dims[0], dims[0] * dims[1]];
-    let mut sum = DVec3::ZERO;
-    for j in 0..dims[b].saturating_sub(1) {
-        for i in 0..dims[a].saturating_sub(1) {
-            let p = i * stride[a] + j * stride[b];
-            let (d, e) = (p + stride[a] + stride[b], points[p]);
-            sum += (points[d] - e).cross(points[p + stride[b]] - points[p + stride[a]]);
-        }
-    }
-    sum.normalize_or(DVec3::AXES[axis])
-}
-
-/// Flags the cells that are hidden themselves or through one of their points; empty when none is.
-fn hidden_cells_of_lattice(dims: [usize; 3], a: &Attributes) -> Vec<bool> {
-    let (cells, points) = (a.cell_array("vtkGhostType"), a.point_array("vtkGhostType"));
-    if cells.is_none() && points.is_none() {
-        return Vec::new();
-    }
-    let n = dims.map(|d| if d == 1 { 1 } else { d.saturating_sub(1) });
-    let mut hidden: Vec<bool> = (0..n.iter().product())
-        .map(|c| cells.is_some_and(|a| a.get(c, 0) as u8 & HIDDEN_CELL != 0))
-        .collect();
-    if let Some(a) = points {
-        for (i, h) in hidden.iter_mut().enumerate() {
-            let at = [i % n[0], i / n[0] % n[1], i / n[0] / n[1]];
-            for corner in 0..8usize {
-                let q: [usize; 3] =
-                    std::array::from_fn(|c| (at[c] + (corner >> c & 1)).min(dims[c] - 1));
-                let id = q[0] + dims[0] * (q[1] + dims[1] * q[2]);
-                *h |= a.get(id, 0) as u8 & HIDDEN_POINT != 0;
-            }
-        }
-    }
-    hidden
 }

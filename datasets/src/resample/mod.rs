@@ -13,7 +13,9 @@
 //! [`Mark`] classifies a node. [`Report`] measures the loss of accuracy by sampling the lattice
 //! back at the points of the mesh.
 
+mod beyond_border;
 mod extrude;
+mod jumps;
 mod mesh;
 mod on_cells;
 mod rasterize;
@@ -22,13 +24,17 @@ mod report;
 mod revolve;
 mod shape;
 mod smooth;
+mod walls;
 
+pub use beyond_border::in_bodies;
+pub use jumps::{JumpReport, average_jumps};
 pub use mesh::{Mesh, Plane};
 pub use on_cells::{Beyond, CellField, CellReport, CellWalker, Entry};
 pub use reconstruct::{FitQuality, Reconstruction};
 pub use report::{Report, ResamplingError};
 pub use revolve::{revolve, revolved_bounds};
 pub use smooth::smooth;
+pub use walls::Walls;
 
 use crate::model::ModelError;
 use glam::DVec3;
@@ -174,6 +180,10 @@ impl Lattice {
     /// Number of nodes.
     pub fn len(&self) -> usize {
         self.dims.iter().product()
+    }
+    /// Size of the box of the nodes.
+    pub fn size(&self) -> DVec3 {
+        self.spacing * DVec3::from_array(self.dims.map(|d| d.saturating_sub(1) as f64))
     }
     /// Always false: a lattice has nodes.
     pub fn is_empty(&self) -> bool {

@@ -20,6 +20,7 @@ from schlieren._index import Index, index
 from schlieren._probe import Probe, probe
 from schlieren._render import render, show, stream, sweep
 from schlieren._schlieren import count_threads
+from schlieren._sheet import Sheet, sheet
 from schlieren._techniques import (
     BOS,
     Beams,
@@ -64,6 +65,7 @@ __all__ = [
     "Schlieren",
     "SchlierenWarning",
     "Shadowgraph",
+    "Sheet",
     "Slice",
     "SlitSource",
     "Stroke",
@@ -73,6 +75,7 @@ __all__ = [
     "probe",
     "render",
     "series",
+    "sheet",
     "show",
     "stream",
     "sweep",

@@ -173,10 +173,12 @@ class Field:
         data, with a warning.
     **options
         `span`, `revolve` : the depth of a two-dimensional flow, or whether it is half of an
-        axisymmetric one. `smoothing_nodes` : standard deviation of the smoothing of shocks.
+        axisymmetric one. `smoothing_nodes` : standard deviation of the smoothing of shocks, or
+        ``"auto"``, which makes jumps from one node to the next averages over cells.
         `resample_nodes`, `resample_samples`, `reconstruction` : how meshes become a lattice.
         `on_cells` : whether light is traced through the cells of the mesh, without a lattice.
-        `outside`, `hidden` : ``"blank"``, ``"solid"`` or ``"gas"``. `reference_n_minus_1` : of
+        `outside` : ``"auto"`` (behind walls a body, behind an open border gas), ``"blank"``,
+        ``"solid"`` or ``"gas"``; `hidden` : one of the last three. `reference_n_minus_1` : of
         the medium around the field. `model` : ``"auto"``, ``"ciddor"`` or ``"gladstone-dale"``.
 
     Examples
@@ -302,12 +304,17 @@ class Field:
         return _xarray.field(cls, data, dims, nan, meaning)
 
     @classmethod
-    def open(cls, path, **meaning):
+    def open(cls, path, *, spacing=None, origin=None, **meaning):
         """The gas in a file: VTK, PLOT3D, NRRD, MetaImage and others that the program reads.
 
         Parameters
         ----------
         path : str or os.PathLike
+        spacing : float or sequence of three floats, optional
+            Distance of nodes in a file that does not say it: NumPy, raw, NRRD, MetaImage, NetCDF
+            without coordinates.
+        origin : sequence of three floats, optional
+            Place of the first node of such a file.
         **meaning
             As for `Field`, with names of arrays of the file in place of arrays.
 
@@ -323,7 +330,15 @@ class Field:
 
         said = Meaning("Field.open", meaning, name_of)
         said.flow["file"] = os.fspath(path)
-        return cls._made(Flow.open(os.fspath(path)), said)
+        if spacing is not None:
+            spacing = _spacing(spacing, 3)
+        if origin is not None:
+            origin = _arrays.several("origin", origin, 3)
+        try:
+            flow = Flow.open(os.fspath(path), spacing, origin)
+        except ValueError as error:
+            raise _words.raised(error) from None
+        return cls._made(flow, said)
 
     def info(self):
         """What the data hold: kind, size, arrays with their ranges.

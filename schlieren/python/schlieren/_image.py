@@ -46,6 +46,9 @@ class Report:
         With bodies.
     march : str
         Method, interpolant and step.
+    outside : dict or None
+        What was decided about places outside the mesh: the part that they are (``percent``), the
+        part in bodies (``bodies_percent``), and what walls were known by (``walls_by``).
     grid : tuple of int or None
         Nodes of the field; none for light through the cells of a mesh.
     index_formula : str
@@ -69,6 +72,7 @@ class Report:
     largest_deflection_rad: float | None
     silhouette_error_px: float | None
     march: str
+    outside: dict | None
     grid: tuple | None
     index_formula: str
     reference_n_minus_1: float
@@ -182,7 +186,7 @@ class Image:
         half = 0.5 * width * self.pixel_m, 0.5 * height * self.pixel_m
         return x - half[0], x + half[0], y - half[1], y + half[1]
 
-    def save(self, path):
+    def save(self, path, *, overlay=None):
         """Writes a file.
 
         Parameters
@@ -190,6 +194,9 @@ class Image:
         path : str or os.PathLike
             ``.png`` for viewing; ``.exr`` with all layers, their units and the scene; ``.npy``
             with the deflection in rad.
+        overlay : str, optional
+            Drawn on a ``.png``, with a scale: ``"arrows"`` or ``"lic"`` (lines along the vectors),
+            each alone or with ``":deflection"`` or ``":displacement"``.
         """
         path = os.fspath(path)
         ending = os.path.splitext(path)[1].lower().lstrip(".")
@@ -197,7 +204,14 @@ class Image:
             raise ValueError(f"path is {path!r}; give a name that ends with .png, .exr or .npy")
         if ending == "npy" and "deflection_rad" not in self._arrays:
             raise ValueError("an .npy file has the deflection; render it with layers='deflection'")
-        self._output.write(path, ending)
+        if overlay is not None:
+            if ending != "png":
+                raise ValueError(f"overlay is {overlay!r} and path {path!r}; it is drawn on .png")
+            if "deflection_rad" not in self._arrays:
+                raise ValueError("an overlay draws vectors; render with layers='deflection'")
+            if not isinstance(overlay, str):
+                raise TypeError(f"overlay is {overlay!r}; give a name, such as 'arrows'")
+        self._output.write(path, ending, overlay)
 
     def _repr_png_(self):
         """For notebooks."""

@@ -13,6 +13,12 @@ MEDIA = ("absorption", "emission", "rotation")
 ROLES = ("blank", "solid", "gas")
 
 
+def _smoothing(name, value):
+    if isinstance(value, str):
+        return _arrays.one_of(name, value, ("auto",))
+    return _arrays.number(name, value, "0 or more, or 'auto'", lambda x: x >= 0)
+
+
 def _options(given):
     """The keys of a scene's flow for options of the lattice."""
     flow = {}
@@ -21,8 +27,8 @@ def _options(given):
         "resample_nodes": lambda n, v: _arrays.whole(n, v, 2, 4096),
         "resample_samples": lambda n, v: _arrays.whole(n, v, 1, 8),
         "reconstruction": lambda n, v: _arrays.one_of(n, v, ("cubic", "linear")),
-        "smoothing_nodes": lambda n, v: _arrays.number(n, v, "0 or more", lambda x: x >= 0),
-        "outside": lambda n, v: _arrays.one_of(n, v, ROLES),
+        "smoothing_nodes": _smoothing,
+        "outside": lambda n, v: _arrays.one_of(n, v, ("auto", *ROLES)),
         "hidden": lambda n, v: _arrays.one_of(n, v, ROLES),
         "reference_n_minus_1": _arrays.number,
         "model": lambda n, v: _arrays.one_of(n, v, ("auto", "ciddor", "gladstone-dale")),
@@ -30,6 +36,9 @@ def _options(given):
     for name, check in checks.items():
         if given.get(name) is not None:
             flow[name] = check(name, given[name])
+    if flow.get("smoothing_nodes") == "auto":
+        del flow["smoothing_nodes"]
+        flow["average_jumps"] = True
     for switch in ("revolve", "on_cells"):
         if not isinstance(given.get(switch, False), (bool, np.bool_)):
             raise TypeError(f"{switch} is {given[switch]!r}; give True or False")

@@ -23,6 +23,14 @@ _NAMES = {
     "view.direction": "view",
     "solids.files": "solids",
     "sampling.samples": "samples",
+    "flow.density_unit_kg_m3": "density_unit",
+    "flow.temperature_zero_k to 273.15": "temperature_unit to 'degC'",
+    "flow.temperature_zero_k": "temperature_unit",
+    "flow.pressure_unit_pa": "pressure_unit",
+    "flow.length_unit_m": "length_unit",
+    "flow.average_jumps": "smoothing_nodes='auto'",
+    "give it as --solid FILE": "give it to solids",
+    "give --spacing DX,DY,DZ": "give spacing",
     "[flow]": "Field",
 }
 _SECTIONS = ("flow", "light", "film", "march", "media", "lenses", "sampling", "technique", "view")

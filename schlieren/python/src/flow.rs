@@ -1,9 +1,11 @@
 //! The data of a flow, and what is rendered of it.
 
 use crate::output::Output;
+use crate::sheet::SheetOutput;
 use crate::work::run;
 use crate::{data, errors};
 use datasets::model::Dataset;
+use datasets::read::OpenOptions;
 use datasets::write::{VtkOptions, write_vtk};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -11,6 +13,7 @@ use pyo3::types::PyDict;
 use schlieren::input::contents_of_dataset;
 use schlieren::render::{Control, Layers, RenderError, TestSection, render};
 use schlieren::scene::Scene;
+use schlieren::sheet::render_sheet;
 use schlieren::solids::Solids;
 use std::path::PathBuf;
 use std::sync::{Mutex, MutexGuard, TryLockError};
@@ -108,8 +111,15 @@ impl Flow {
 
     /// The flow in a file.
     #[staticmethod]
-    fn open(py: Python<'_>, path: PathBuf) -> PyResult<Flow> {
-        let read = run(py, 0, |_| schlieren::input::dataset(&path))?;
+    #[pyo3(signature = (path, spacing=None, origin=None))]
+    fn open(
+        py: Python<'_>,
+        path: PathBuf,
+        spacing: Option<[f64; 3]>,
+        origin: Option<[f64; 3]>,
+    ) -> PyResult<Flow> {
+        let open = OpenOptions { time: None, spacing, origin };
+        let read = run(py, 0, |_| schlieren::input::dataset(&path, &open))?;
         let (data, notes) = read.map_err(|e| errors::of_input(&e))?;
         Ok(Flow::of(data, notes))
     }
@@ -158,6 +168,27 @@ impl Flow {
             let dims = section.grid();
             self.keep(of, section);
             Ok(Output::new(rendered, scene, input, dims, seconds))
+        };
+        run(py, threads, work)?
+    }
+
+    /// Renders the panels of a contact sheet.
+    fn sheet(&self, py: Python<'_>, scene: &str, threads: usize) -> PyResult<SheetOutput> {
+        let scene = scene_of(scene)?;
+        let work = |stop: &rt_core_python_work::Stop| -> PyResult<SheetOutput> {
+            let start = Instant::now();
+            let (of, section) = self.section(&scene)?;
+            let flag = stop.flag();
+            let control = Control { cancel: &flag, ..Control::default() };
+            let rendered = render_sheet(&scene, &section, &control);
+            let cut = rendered.as_ref().map_or(true, |s| s.interrupted);
+            if cut && flag.load(std::sync::atomic::Ordering::Relaxed) {
+                stop.note();
+            }
+            let sheet = rendered.map_err(|e| errors::of_render(&e))?;
+            let input = section.input.clone();
+            self.keep(of, section);
+            Ok(SheetOutput::new(sheet, scene, input, start.elapsed().as_secs_f64()))
         };
         run(py, threads, work)?
     }

@@ -10,6 +10,7 @@ mod errors;
 mod flow;
 mod index;
 mod output;
+mod sheet;
 mod work;
 
 use pyo3::prelude::*;
@@ -23,6 +24,8 @@ mod _schlieren {
     use super::index::index;
     #[pymodule_export]
     use super::output::Output;
+    #[pymodule_export]
+    use super::sheet::SheetOutput;
     #[pymodule_export]
     use super::work::{count_stopped_calls, count_threads};
 }

@@ -5,8 +5,9 @@ use crate::work::run;
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
+use schlieren::drawing::{Canvas, draw_overlay};
 use schlieren::input;
-use schlieren::output::{encode_png, write_exr, write_npy, write_png};
+use schlieren::output::{encode_png, write_canvas, write_exr, write_npy, write_png};
 use schlieren::render::RenderOutput;
 use schlieren::scene::Scene;
 use serde_json::json;
@@ -100,6 +101,7 @@ impl Output {
         let report = json!({
             "technique": self.scene.technique.name(),
             "grid": self.dims,
+            "outside": input.and_then(|i| i.outside.clone()),
             "index_formula": input.map(|i| i.formula),
             "reference_n_minus_1": input.map(|i| i.reference_n_minus_1),
             "n_minus_1_range": input.map(|i| i.n_minus_1_range),
@@ -136,11 +138,29 @@ impl Output {
         Ok(PyBytes::new(py, &bytes))
     }
 
-    /// Writes a file; its ending is `png`, `exr` or `npy`.
-    fn write(&self, py: Python<'_>, path: PathBuf, ending: &str) -> PyResult<()> {
-        let written = run(py, 0, |_| match ending {
-            "png" => write_png(&path, &self.rendered).map(drop),
-            "npy" => write_npy(&path, &self.rendered),
+    /// Writes a file; its ending is `png`, `exr` or `npy`. An overlay is drawn on a PNG file.
+    #[pyo3(signature = (path, ending, overlay=None))]
+    fn write(
+        &self,
+        py: Python<'_>,
+        path: PathBuf,
+        ending: &str,
+        overlay: Option<&str>,
+    ) -> PyResult<()> {
+        let overlay = overlay.map(crate::sheet::overlay).transpose()?;
+        let written = run(py, 0, |_| match (ending, overlay, &self.rendered.map) {
+            ("png", Some(overlay), Some(map)) => {
+                let (width, height) = self.size();
+                let mut canvas = Canvas {
+                    width: width as usize,
+                    height: height as usize,
+                    pixels: self.rendered.pixels.clone(),
+                };
+                draw_overlay(&mut canvas, map, overlay);
+                write_canvas(&path, &canvas).map(drop)
+            }
+            ("png", ..) => write_png(&path, &self.rendered).map(drop),
+            ("npy", ..) => write_npy(&path, &self.rendered),
             _ => write_exr(&path, &self.rendered, &self.scene, self.seconds.iter().sum()),
         })?;
         written.map_err(|e| errors::of_output(&e))

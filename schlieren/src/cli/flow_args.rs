@@ -1,9 +1,9 @@
 //! Parses the options that give the flow's arrays their meaning, and applies them to the scene.
 
-use super::units;
+use super::units::{self, Smoothing};
 use crate::index::conditions::Model;
 use crate::index::multifield::Rule;
-use crate::input::Role;
+use crate::input::{Outside, Role};
 use crate::scene::{CurveSpec, FlowSpec, Scene};
 use clap::Args;
 use datasets::cli::UsageError;
@@ -22,9 +22,15 @@ pub(super) struct FlowArgs {
     /// Array with the temperature in K
     #[arg(long, value_name = "NAME")]
     temperature: Option<String>,
+    /// Added to the temperature: 273.15 when it is in C
+    #[arg(long, value_name = "KELVIN", allow_hyphen_values = true)]
+    temperature_zero: Option<f64>,
     /// Array with the pressure in Pa
     #[arg(long, value_name = "NAME")]
     pressure: Option<String>,
+    /// Pa per unit of the pressure array
+    #[arg(long, value_name = "NUMBER")]
+    pressure_unit: Option<f64>,
     /// Array with the relative humidity, 0 to 1
     #[arg(long, value_name = "NAME")]
     humidity: Option<String>,
@@ -53,6 +59,13 @@ pub(super) struct FlowArgs {
     /// Metres per unit of the file's coordinates
     #[arg(long, value_name = "METRES", value_parser = units::length)]
     length_unit: Option<f64>,
+    /// Distance between the points of a file that does not say it (NumPy, raw, NRRD, MetaImage,
+    /// NetCDF without coordinates), in units of the file
+    #[arg(long, value_name = "DX,DY,DZ", value_parser = units::three)]
+    spacing: Option<[f64; 3]>,
+    /// Position of the first point of such a file
+    #[arg(long, value_name = "X,Y,Z", value_parser = units::three, allow_hyphen_values = true)]
+    origin: Option<[f64; 3]>,
     /// Depth of two-dimensional data, in units of the file
     #[arg(long, value_name = "NUMBER")]
     span: Option<f64>,
@@ -71,13 +84,14 @@ pub(super) struct FlowArgs {
     /// Values between the points of a mesh: cubic (smooth, of fourth order) or linear (as VTK's)
     #[arg(long, value_name = "HOW", value_parser = units::reconstruction)]
     reconstruction: Option<Reconstruction>,
-    /// Standard deviation of the smoothing of shocks, in nodes
-    #[arg(long, value_name = "NODES")]
-    smoothing: Option<f64>,
-    /// Role of nodes outside the mesh: blank, solid (a body) or gas (undisturbed flow). gas with
-    /// --revolve, otherwise blank
-    #[arg(long, value_name = "ROLE", value_parser = units::role)]
-    outside: Option<Role>,
+    /// Standard deviation of the smoothing of shocks, in nodes; or auto: jumps from one node to the
+    /// next become averages over cells, which shocks sampled at points need
+    #[arg(long, value_name = "NODES|auto", value_parser = units::smoothing)]
+    smoothing: Option<Smoothing>,
+    /// What is outside the mesh: auto (behind walls a body, behind an open border gas), or blank,
+    /// solid (a body) or gas (as beside it) everywhere [default: auto]
+    #[arg(long, value_name = "ROLE", value_parser = units::outside)]
+    outside: Option<Outside>,
     /// Role of cells hidden by the solver: blank, solid or gas
     #[arg(long, value_name = "ROLE", value_parser = units::role)]
     hidden: Option<Role>,
@@ -117,6 +131,10 @@ impl FlowArgs {
         set(&mut f.electrons, &a.electrons);
         f.species.extend(a.species.iter().cloned());
         f.density_unit_kg_m3 = a.density_unit.or(f.density_unit_kg_m3);
+        f.temperature_zero_k = a.temperature_zero.or(f.temperature_zero_k);
+        f.pressure_unit_pa = a.pressure_unit.or(f.pressure_unit_pa);
+        f.spacing = a.spacing.or(f.spacing);
+        f.origin = a.origin.or(f.origin);
         f.length_unit_m = a.length_unit.unwrap_or(f.length_unit_m);
         f.span = a.span.or(f.span.filter(|_| !a.revolve));
         f.revolve = a.revolve || (f.revolve && a.span.is_none());
@@ -124,8 +142,14 @@ impl FlowArgs {
         f.resample_nodes = a.resample.or(f.resample_nodes);
         f.resample_samples = a.resample_samples.unwrap_or(f.resample_samples);
         f.reconstruction = a.reconstruction.unwrap_or(f.reconstruction);
-        f.smoothing_nodes = a.smoothing.unwrap_or(f.smoothing_nodes);
-        f.outside = a.outside.or(f.outside);
+        match a.smoothing {
+            Some(Smoothing::Auto) => f.average_jumps = true,
+            Some(Smoothing::Nodes(nodes)) => {
+                (f.smoothing_nodes, f.average_jumps) = (nodes, false);
+            }
+            None => {}
+        }
+        f.outside = a.outside.unwrap_or(f.outside);
         f.hidden = a.hidden.unwrap_or(f.hidden);
         self.apply_curves(f)
     }

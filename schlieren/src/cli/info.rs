@@ -1,8 +1,10 @@
 //! Implements `schlieren info`: what a flow's file holds, and a command that renders it.
 
+use super::units;
 use crate::input::{Contents, contents};
 use clap::Args;
 use datasets::cli::CommonArgs;
+use datasets::read::OpenOptions;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -14,6 +16,13 @@ use std::path::{Path, PathBuf};
 pub(super) struct InfoArgs {
     /// The flow, of any format that `schlieren render` reads
     file: PathBuf,
+    /// Distance between the points of a file that does not say it (NumPy, raw, NRRD, MetaImage,
+    /// NetCDF without coordinates)
+    #[arg(long, value_name = "DX,DY,DZ", value_parser = units::three)]
+    spacing: Option<[f64; 3]>,
+    /// Position of the first point of such a file
+    #[arg(long, value_name = "X,Y,Z", value_parser = units::three, allow_hyphen_values = true)]
+    origin: Option<[f64; 3]>,
 }
 
 #[derive(Serialize)]
@@ -26,19 +35,25 @@ struct Info<'a> {
 }
 
 pub(super) fn info(common: CommonArgs, args: &InfoArgs) -> anyhow::Result<()> {
-    let contents = contents(&args.file)?;
-    let command = command(&args.file, &contents);
+    let open = OpenOptions { time: None, spacing: args.spacing, origin: args.origin };
+    let contents = contents(&args.file, &open)?;
+    let command = command(&args.file, &open, &contents);
     let info = Info { file: &args.file, contents: &contents, command };
     common.result(&info, || text(&info))
 }
 
 /// A command that renders the file.
-fn command(file: &Path, contents: &Contents) -> Option<String> {
+fn command(file: &Path, open: &OpenOptions, contents: &Contents) -> Option<String> {
     let guess = contents.guess.as_ref()?;
     let mut words = vec!["schlieren".into(), "render".into(), file.display().to_string()];
     for (option, value) in &guess.options {
         words.push((*option).to_owned());
         words.extend(Some(value.clone()).filter(|v| !v.is_empty()));
+    }
+    for (option, value) in [("--spacing", open.spacing), ("--origin", open.origin)] {
+        if let Some([x, y, z]) = value {
+            words.push(format!("{option}={x},{y},{z}"));
+        }
     }
     words.extend(["-o".into(), "flow.png".into()]);
     Some(words.iter().map(|w| quoted(w)).collect::<Vec<_>>().join(" "))

@@ -3,14 +3,17 @@
 mod flow_args;
 mod index;
 mod info;
+mod march_args;
 mod media_args;
 mod probe;
 mod render;
 mod scene_args;
 #[cfg(feature = "serve")]
 mod serve;
+mod sheet;
 mod sweep;
 mod units;
+mod words;
 
 use clap::{Parser, Subcommand};
 use datasets::cli::{CommonArgs, CompletionsArgs, ManArgs, run_main};
@@ -30,6 +33,8 @@ struct Cli {
 enum Command {
     /// Renders a flow
     Render(Box<render::RenderArgs>),
+    /// Renders a flow by all techniques into one labelled picture
+    Sheet(Box<sheet::SheetArgs>),
     /// Renders a time series, or one flow for several values of a key of its scene
     Sweep(Box<sweep::SweepArgs>),
     /// Prints what a flow's file holds, and a command that renders it
@@ -50,13 +55,14 @@ enum Command {
 
 /// Runs the program. Exit codes: 0 done, 1 failed, 2 wrong usage, 130 interrupted.
 pub fn main() -> ExitCode {
-    run_main(|| execute(Cli::try_parse()?))
+    run_main(|| execute(Cli::try_parse()?).map_err(words::error_in_options))
 }
 
 fn execute(cli: Cli) -> anyhow::Result<()> {
     let common = cli.common;
     match cli.command {
         Command::Render(args) => render::render(common, &args),
+        Command::Sheet(args) => sheet::sheet(common, &args),
         Command::Sweep(args) => sweep::sweep(common, &args),
         Command::Info(args) => info::info(common, &args),
         Command::Probe(args) => probe::probe(common, &args),

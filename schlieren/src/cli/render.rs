@@ -1,6 +1,8 @@
 //! Implements `schlieren render`: renders one image of a flow.
 
 use super::scene_args::SceneArgs;
+use super::words::in_options;
+use crate::drawing::{Canvas, Overlay, draw_overlay};
 use crate::output;
 use crate::render::{Control, Layers, RenderError, RenderOutput, TestSection};
 use crate::scene::{Scene, TechniqueSpec};
@@ -34,6 +36,14 @@ pub(super) struct RenderArgs {
     /// the two images
     #[arg(long, value_name = "PNG")]
     reference: Option<PathBuf>,
+    /// Displacement as NumPy array (height, width, 2) in m of the test section, along right and up:
+    /// with --technique bos that of the background's dots, as correlating the two pictures gives it
+    #[arg(long, value_name = "NPY")]
+    displacement: Option<PathBuf>,
+    /// Draw vectors on the PNG, with a scale: arrows (over the picture) or lic (lines along them),
+    /// of the deflection or the displacement [default: bos: displacement; else: deflection]
+    #[arg(long, value_name = "arrows|lic[:deflection|:displacement]")]
+    overlay: Option<Overlay>,
     /// Print the effective scene as TOML; render only if an output is given
     #[arg(long)]
     print_scene: bool,
@@ -48,6 +58,14 @@ pub(super) fn render(common: CommonArgs, args: &RenderArgs) -> anyhow::Result<()
     if let Some(path) = &args.reference {
         outputs.reference = Some(reference_path(path, &scene)?);
     }
+    if let Some(path) = &args.displacement {
+        check_ending("--displacement", path, "npy")?;
+        outputs.displacement = Some(path);
+    }
+    if args.overlay.is_some() && outputs.png.is_none() {
+        return Err(UsageError("--overlay draws on the PNG; give -o PNG".into()).into());
+    }
+    outputs.overlay = args.overlay;
     if args.print_scene {
         std::io::stdout().lock().write_all(scene.effective().to_toml()?.as_bytes())?;
     }
@@ -72,6 +90,9 @@ pub(super) struct Outputs<'a> {
     npy: Option<&'a Path>,
     /// The background without the flow.
     reference: Option<&'a Path>,
+    displacement: Option<&'a Path>,
+    /// What is drawn on the PNG.
+    overlay: Option<Overlay>,
 }
 
 /// Checks that the scene has a background, and the name of its file.
@@ -82,10 +103,15 @@ fn reference_path<'p>(path: &'p Path, scene: &Scene) -> Result<&'p Path, UsageEr
             scene.technique.name()
         )));
     }
-    if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) {
-        return Err(UsageError(format!("--reference `{}` does not end in .png", path.display())));
-    }
+    check_ending("--reference", path, "png")?;
     Ok(path)
+}
+
+fn check_ending(flag: &str, path: &Path, ending: &str) -> Result<(), UsageError> {
+    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending)) {
+        return Ok(());
+    }
+    Err(UsageError(format!("{flag} `{}` does not end in .{ending}", path.display())))
 }
 
 impl<'a> Outputs<'a> {
@@ -98,28 +124,22 @@ impl<'a> Outputs<'a> {
         for (path, ending, flag) in
             [(png, "png", "-o"), (exr, "exr", "--exr"), (npy, "npy", "--npy")]
         {
-            let Some(path) = path else { continue };
-            if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending)) {
-                return Err(UsageError(format!(
-                    "{flag} `{}` does not end in .{ending}",
-                    path.display()
-                )));
-            }
+            path.map_or(Ok(()), |p| check_ending(flag, p, ending))?;
         }
-        Ok(Outputs { png, exr, npy, reference: None })
+        Ok(Outputs { png, exr, npy, reference: None, displacement: None, overlay: None })
     }
 
     pub(super) fn is_empty(&self) -> bool {
-        [self.png, self.exr, self.npy, self.reference].iter().all(Option::is_none)
+        self.files().iter().all(Option::is_none)
+    }
+
+    fn files(&self) -> [Option<&'a Path>; 5] {
+        [self.png, self.exr, self.npy, self.reference, self.displacement]
     }
 
     fn names(&self) -> String {
-        let names: Vec<String> = [self.png, self.exr, self.npy, self.reference]
-            .iter()
-            .flatten()
-            .map(|p| p.display().to_string())
-            .collect();
-        names.join(", ")
+        let names = self.files().into_iter().flatten().map(|p| p.display().to_string());
+        names.collect::<Vec<_>>().join(", ")
     }
 }
 
@@ -142,7 +162,11 @@ pub(super) fn render_and_write(
     cancel.check()?;
 
     let layers = Layers {
-        map: outputs.exr.is_some() || outputs.npy.is_some() || common.json,
+        map: outputs.exr.is_some()
+            || outputs.npy.is_some()
+            || outputs.displacement.is_some()
+            || outputs.overlay.is_some()
+            || common.json,
         phase: outputs.exr.is_some(),
         counts: outputs.exr.is_some(),
         noise: outputs.exr.is_some(),
@@ -169,9 +193,9 @@ pub(super) fn render_and_write(
             other => output::write_png(path, &other?)?,
         };
     }
-    write(outputs, scene, &rendered, start.elapsed().as_secs_f64())?;
+    let overlay_scale = write(outputs, scene, &rendered, start.elapsed().as_secs_f64())?;
     for w in &rendered.report.warnings {
-        common.warn(w);
+        common.warn(&in_options(w));
     }
     let r = &rendered.report;
     let json = json!({
@@ -202,6 +226,10 @@ pub(super) fn render_and_write(
         "exr": outputs.exr,
         "npy": outputs.npy,
         "reference": outputs.reference,
+        "displacement": outputs.displacement,
+        "overlay": outputs.overlay.map(|o| json!({ "style": o.style, "scale": overlay_scale })),
+        "outside": section.input.as_ref().and_then(|i| i.outside.clone()),
+        "jumps": section.input.as_ref().and_then(|i| i.jumps).map(|j| j.jumps),
     });
     let deflection = r
         .largest_deflection_rad
@@ -248,9 +276,22 @@ fn write(
     scene: &Scene,
     rendered: &RenderOutput,
     elapsed_secs: f64,
-) -> anyhow::Result<()> {
-    if let Some(path) = outputs.png {
-        output::write_png(path, rendered)?;
+) -> anyhow::Result<Option<f64>> {
+    let mut scale = None;
+    match (outputs.png, outputs.overlay, &rendered.map) {
+        (Some(path), Some(overlay), Some(map)) => {
+            let [width, height] = scene.film.size.map(|n| n as usize);
+            let mut canvas = Canvas { width, height, pixels: rendered.pixels.clone() };
+            scale = Some(draw_overlay(&mut canvas, map, overlay));
+            output::write_canvas(path, &canvas)?;
+        }
+        (Some(path), ..) => {
+            output::write_png(path, rendered)?;
+        }
+        _ => {}
+    }
+    if let Some(path) = outputs.displacement {
+        output::write_displacement(path, rendered)?;
     }
     if let Some(path) = outputs.exr {
         output::write_exr(path, rendered, scene, elapsed_secs)?;
@@ -258,5 +299,5 @@ fn write(
     if let Some(path) = outputs.npy {
         output::write_npy(path, rendered)?;
     }
-    Ok(())
+    Ok(scale)
 }

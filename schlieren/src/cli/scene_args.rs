@@ -2,11 +2,11 @@
 //! without effect is an error that names the option.
 
 use super::flow_args::FlowArgs;
+use super::march_args::{FrameArgs, MarchArgs, ViewArgs};
 use super::media_args::MediaArgs;
 use super::units;
 use crate::scene::{
-    BeamsSpec, CutoffSpec, Device, Direction, FilterSpec, Jitter, SamplingSpec, Scene, SourceSpec,
-    TechniqueSpec,
+    BeamsSpec, CutoffSpec, FilterSpec, Jitter, SamplingSpec, Scene, SourceSpec, TechniqueSpec,
 };
 use clap::Args;
 use datasets::cli::UsageError;
@@ -21,25 +21,25 @@ pub(super) struct SceneArgs {
     #[command(flatten)]
     flow: FlowArgs,
     #[command(flatten)]
+    view: ViewArgs,
+    #[command(flatten)]
     optics: OpticsArgs,
     #[command(flatten)]
     media: MediaArgs,
     #[command(flatten)]
+    frame: FrameArgs,
+    #[command(flatten)]
     film: FilmArgs,
+    #[command(flatten)]
+    march: MarchArgs,
 }
 
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Light and optics (lengths in m, or with mm, um, nm)")]
 struct OpticsArgs {
-    /// x, y, z, or azimuth and elevation of the light in degrees
-    #[arg(long, value_name = "x|y|z|AZ,EL", allow_hyphen_values = true)]
-    view: Option<Direction>,
     /// shadowgraph, schlieren, interferogram or bos; for comparison: volume or slice
     #[arg(long, value_name = "NAME", value_parser = technique)]
     technique: Option<TechniqueSpec>,
-    /// Vacuum wavelengths in nm, separated by commas; each is traced by itself
-    #[arg(long, value_name = "NM", value_delimiter = ',')]
-    wavelength: Vec<f64>,
     /// point, slit:WIDTH,LENGTH or circle:DIAMETER
     #[arg(long, value_name = "SHAPE", value_parser = units::source)]
     source: Option<SourceSpec>,
@@ -92,14 +92,8 @@ struct OpticsArgs {
 }
 
 #[derive(Debug, Clone, Args)]
-#[command(next_help_heading = "Film and accuracy")]
+#[command(next_help_heading = "Film")]
 struct FilmArgs {
-    /// Width and height in pixels
-    #[arg(long, value_name = "WxH", value_parser = units::size)]
-    size: Option<[u32; 2]>,
-    /// Width of the field of view [default: the whole field]
-    #[arg(long, value_name = "LENGTH", value_parser = units::length)]
-    field_of_view: Option<f64>,
     /// Brightness factor; 1 makes undisturbed light white
     #[arg(long, value_name = "FACTOR")]
     exposure: Option<f64>,
@@ -123,25 +117,6 @@ struct FilmArgs {
     /// Trace every photon in the beam of its own point of the source
     #[arg(long)]
     tilted_beams: bool,
-    /// Largest error of a deflection: 1e-7rad, 0.1urad
-    #[arg(long, value_name = "ANGLE", value_parser = units::angle_rad)]
-    tolerance: Option<f64>,
-    /// Force a march: line-of-sight, verlet, ...
-    #[arg(long, value_name = "NAME")]
-    march: Option<String>,
-    /// Force an interpolant: b-spline, trilinear, trilinear-gradient
-    #[arg(long, value_name = "NAME")]
-    interpolant: Option<String>,
-    /// Force a step, in voxels
-    #[arg(long, value_name = "VOXELS")]
-    step: Option<f64>,
-    /// Skip gas so uniform that no ray's deflection changes by more than this in total: 1e-9rad.
-    /// For verlet on the CPU
-    #[arg(long, value_name = "ANGLE", value_parser = units::angle_rad)]
-    skip: Option<f64>,
-    /// Where to trace: gpu needs a Vulkan device; auto uses one if possible, else warns why
-    #[arg(long, value_enum, value_name = "DEVICE")]
-    device: Option<Device>,
 }
 
 fn technique(text: &str) -> Result<TechniqueSpec, String> {
@@ -190,9 +165,12 @@ impl SceneArgs {
             return Err(UsageError("no flow: give a file, or a scene that names one".into()).into());
         }
         self.flow.apply(&mut s)?;
+        self.view.apply(&mut s);
         self.optics.apply(&mut s)?;
         self.media.apply(&mut s.media);
-        self.film.apply(&mut s)?;
+        self.frame.apply(&mut s);
+        self.film.apply(&mut s);
+        self.march.apply(&mut s)?;
         // Without a scene file, the values come from the command line, so an invalid scene is wrong
         // usage.
         if let Err(e) = s.check() {
@@ -208,15 +186,10 @@ impl SceneArgs {
 impl OpticsArgs {
     fn apply(&self, s: &mut Scene) -> anyhow::Result<()> {
         let a = self;
-        s.view.direction = a.view.unwrap_or(s.view.direction);
         if let Some(t) = &a.technique
             && t.name() != s.technique.name()
         {
             s.technique = t.clone();
-        }
-        if !a.wavelength.is_empty() {
-            s.light.wavelengths_nm.clone_from(&a.wavelength);
-            s.light.weights.clear();
         }
         s.light.source = a.source.or(s.light.source);
         s.film.focus_m = a.film_distance.or(s.film.focus_m);
@@ -365,10 +338,8 @@ impl OpticsArgs {
 }
 
 impl FilmArgs {
-    fn apply(&self, s: &mut Scene) -> anyhow::Result<()> {
+    fn apply(&self, s: &mut Scene) {
         let a = self;
-        s.film.size = a.size.unwrap_or(s.film.size);
-        s.film.field_of_view_m = a.field_of_view.or(s.film.field_of_view_m);
         s.film.exposure = a.exposure.or(s.film.exposure);
         if a.noise_free {
             s.sampling = Some(SamplingSpec::Beams { cells_per_side: 1 });
@@ -392,17 +363,5 @@ impl FilmArgs {
             }
             s.sampling = Some(photons);
         }
-        s.march.tolerance_rad = a.tolerance.unwrap_or(s.march.tolerance_rad);
-        if a.march.is_some() {
-            s.march.method.clone_from(&a.march);
-        }
-        if a.interpolant.is_some() {
-            s.march.interpolant.clone_from(&a.interpolant);
-        }
-        s.march.step_voxels = a.step.or(s.march.step_voxels);
-        s.march.skip_rad = a.skip.unwrap_or(s.march.skip_rad);
-        s.march.device = a.device.unwrap_or(s.march.device);
-        crate::render::check_gpu(&s.march).map_err(|e| UsageError(format!("--device gpu: {e}")))?;
-        Ok(())
     }
 }

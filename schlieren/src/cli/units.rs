@@ -1,7 +1,7 @@
 //! Parses the values of options, with their units.
 
 use crate::index::multifield::Rule;
-use crate::input::Role;
+use crate::input::{Outside, Role};
 use crate::scene::SourceSpec;
 use datasets::resample::Reconstruction;
 
@@ -122,6 +122,16 @@ pub(super) fn role(text: &str) -> Result<Role, String> {
     }
 }
 
+/// Parses what is outside the mesh.
+pub(super) fn outside(text: &str) -> Result<Outside, String> {
+    if text == "auto" {
+        return Ok(Outside::Auto);
+    }
+    role(text)
+        .map(Outside::from)
+        .map_err(|_| format!("`{text}` is not a role; there are: auto, blank, solid, gas"))
+}
+
 /// Parses a way to compute values between the points of a mesh.
 pub(super) fn reconstruction(text: &str) -> Result<Reconstruction, String> {
     let found = Reconstruction::ALL.into_iter().find(|r| r.name() == text);
@@ -132,6 +142,37 @@ pub(super) fn reconstruction(text: &str) -> Result<Reconstruction, String> {
 pub(super) fn resample_samples(text: &str) -> Result<usize, String> {
     let number = text.parse::<usize>().ok().filter(|n| (1..=8).contains(n));
     number.ok_or_else(|| format!("`{text}` is not a number of samples from 1 to 8"))
+}
+
+/// How shocks are smoothed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Smoothing {
+    /// By this standard deviation in nodes.
+    Nodes(f64),
+    /// Jumps become averages over cells.
+    Auto,
+}
+
+/// Parses a smoothing.
+pub(super) fn smoothing(text: &str) -> Result<Smoothing, String> {
+    if text == "auto" {
+        return Ok(Smoothing::Auto);
+    }
+    let nodes = text.parse().ok().filter(|n: &f64| n.is_finite() && *n >= 0.0);
+    nodes
+        .map(Smoothing::Nodes)
+        .ok_or_else(|| format!("`{text}` is not a smoothing; write auto, or nodes such as 1.2"))
+}
+
+/// Parses three numbers, `0.1,0.1,0.2`, or one for all axes.
+pub(super) fn three(text: &str) -> Result<[f64; 3], String> {
+    let numbers: Option<Vec<f64>> =
+        text.split(',').map(|t| t.trim().parse().ok().filter(|v: &f64| v.is_finite())).collect();
+    match numbers.as_deref() {
+        Some([x]) => Ok([*x; 3]),
+        Some([x, y, z]) => Ok([*x, *y, *z]),
+        _ => Err(format!("`{text}` is not three numbers; write for example 0.1,0.1,0.2")),
+    }
 }
 
 /// Parses two numbers, `320,200`.

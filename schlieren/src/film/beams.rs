@@ -12,7 +12,7 @@
 //! cell too large.
 
 use super::photons::Exposure;
-use super::{Film, Tally, quantize};
+use super::{Film, Tally, quantize, trace_unless_cancelled};
 use crate::optics::PlaneVector;
 use crate::path::{Exit, Start, Status};
 use crate::technique::Photon;
@@ -62,17 +62,13 @@ pub fn expose_beams<const C: usize>(
                 return tally;
             }
             let last = (first + BAND).min(rows - 1);
-            let mut above =
-                corners(exposure, film, &source_points, columns, position_px(first), &position_px);
+            let row_of = |row: usize| {
+                let y = position_px(row);
+                corners(exposure, film, &source_points, columns, y, &position_px, cancel)
+            };
+            let Some(mut above) = row_of(first) else { return tally };
             for row in first..last {
-                let below = corners(
-                    exposure,
-                    film,
-                    &source_points,
-                    columns,
-                    position_px(row + 1),
-                    &position_px,
-                );
+                let Some(below) = row_of(row + 1) else { return tally };
                 for c in 0..columns - 1 {
                     let [a, b, d, e] = [above[c], above[c + 1], below[c], below[c + 1]];
                     // The diagonal alternates so that no direction is preferred.
@@ -114,7 +110,7 @@ fn source_points(exposure: &Exposure<'_>) -> Vec<PlaneVector> {
     (0..SOURCE_POINTS).map(point).collect()
 }
 
-/// A row of corners at height `y` in pixels.
+/// A row of corners at height `y` in pixels; `None` when `cancel` was set.
 fn corners<const C: usize>(
     exposure: &Exposure<'_>,
     film: &Film<C>,
@@ -122,7 +118,8 @@ fn corners<const C: usize>(
     columns: usize,
     y: f64,
     position_px: &impl Fn(usize) -> f64,
-) -> Vec<Corner> {
+    cancel: &AtomicBool,
+) -> Option<Vec<Corner>> {
     let (framing, technique) = (film.framing(), exposure.technique);
     let start = |i: usize| Start {
         position_m: framing.plane_from_pixel(position_px(i), y).map(|c| c as f32),
@@ -130,7 +127,9 @@ fn corners<const C: usize>(
     };
     let starts: Vec<Start> = (0..columns).map(start).collect();
     let mut exits = vec![Exit::UNDISTURBED; columns];
-    exposure.paths.trace(&starts, &mut exits);
+    if !trace_unless_cancelled(exposure.paths, &starts, &mut exits, cancel) {
+        return None;
+    }
     let corner = |(i, (start, exit)): (usize, (&Start, &Exit))| {
         let stopped = exit.status == Status::Turned || exit.transmission <= 0.0;
         if stopped || exposure.solids.is_some_and(|s| s.block(exposure.paths.view(), start)) {
@@ -154,7 +153,7 @@ fn corners<const C: usize>(
         let at_px = [position_px(i) + shift[0] / framing.pixel_m, y - shift[1] / framing.pixel_m];
         Corner { at_px, energy }
     };
-    starts.iter().zip(&exits).enumerate().map(corner).collect()
+    Some(starts.iter().zip(&exits).enumerate().map(corner).collect())
 }
 
 /// Distributes the energy of a triangle: `area_px` is its original area, and its energy per pixel

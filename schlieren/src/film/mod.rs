@@ -15,7 +15,53 @@ pub mod traced;
 
 pub(crate) use tile::{PhotonTile, TILE};
 
-use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
+use crate::path::{Exit, LightPaths, Start};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
+
+/// Traces rays on this thread, some at a time. Returns false when `cancel` was set; exits are then
+/// partly computed and must be discarded.
+pub(crate) fn trace_unless_cancelled(
+    paths: &dyn LightPaths,
+    starts: &[Start],
+    exits: &mut [Exit],
+    cancel: &AtomicBool,
+) -> bool {
+    let at_once = paths.rays_at_once().unwrap_or(starts.len()).max(1);
+    for (starts, exits) in starts.chunks(at_once).zip(exits.chunks_mut(at_once)) {
+        if cancel.load(Ordering::Relaxed) {
+            return false;
+        }
+        paths.trace(starts, exits);
+    }
+    true
+}
+
+/// As [`trace_unless_cancelled`], on all threads.
+pub(crate) fn trace_parallel_unless_cancelled(
+    paths: &dyn LightPaths,
+    starts: &[Start],
+    exits: &mut [Exit],
+    cancel: &AtomicBool,
+    progress: &(dyn Fn(usize) + Sync),
+) -> bool {
+    use rayon::prelude::*;
+    if paths.rays_at_once().is_none() {
+        paths.trace_parallel(starts, exits);
+        progress(starts.len());
+        return !cancel.load(Ordering::Relaxed);
+    }
+    // As in `LightPaths::trace_parallel`.
+    const CHUNK: usize = 1024;
+    starts
+        .par_chunks(CHUNK)
+        .zip(exits.par_chunks_mut(CHUNK))
+        .map(|(s, e)| {
+            let whole = trace_unless_cancelled(paths, s, e, cancel);
+            progress(s.len());
+            whole
+        })
+        .reduce(|| true, |a, b| a && b)
+}
 
 /// Energy 1 in fixed point. A pixel holds 2³² photons of energy 1 before it overflows. The
 /// quantisation error, 2⁻³³ per photon, is far below the rounding of the f32 energy.
@@ -178,6 +224,66 @@ mod tests {
         assert_eq!(starts[7].position_m, [0.75, -0.25]);
         // A tall field in a wide frame is not cropped.
         assert_eq!(Framing::fitted(4, 2, [0.5, 2.0]).pixel_m, 1.0);
+    }
+
+    /// Paths that cancel while they trace.
+    struct Cancelling<'a> {
+        paths: crate::testing::ClosedForm,
+        cancel: &'a AtomicBool,
+        traced: std::sync::atomic::AtomicUsize,
+    }
+
+    impl LightPaths for Cancelling<'_> {
+        fn trace(&self, starts: &[Start], exits: &mut [Exit]) {
+            self.traced.fetch_add(starts.len(), Ordering::Relaxed);
+            self.cancel.store(true, Ordering::Relaxed);
+            self.paths.trace(starts, exits);
+        }
+
+        fn view(&self) -> &crate::view::View {
+            self.paths.view()
+        }
+
+        fn quantities(&self) -> crate::path::PathQuantities {
+            self.paths.quantities()
+        }
+
+        fn difference_step_m(&self) -> f64 {
+            self.paths.difference_step_m()
+        }
+    }
+
+    #[test]
+    fn a_cancelled_exposure_ends_within_a_tile() {
+        let technique = crate::technique::Technique::Shadowgraph(crate::optics::Optics::DEFAULT);
+        let framing = Framing::fitted(32, 32, [1.0, 1.0]);
+        for by_photons in [true, false] {
+            let cancel = AtomicBool::new(false);
+            let prism = crate::testing::ClosedForm::prism([1e-4, 0.0]);
+            let paths = Cancelling { paths: prism, cancel: &cancel, traced: 0.into() };
+            let exposure = photons::Exposure {
+                paths: &paths,
+                technique: &technique,
+                solids: None,
+                sampling: rt_core::sampler::Sampling::Sobol,
+                seed: 0,
+                margin_px: 0,
+                tilted_beams: false,
+            };
+            let film = Film::<1>::new(framing, false);
+            let nothing = |_: u64| ();
+            let is_none = if by_photons {
+                let films = [film];
+                photons::expose(&exposure, &films, 0..64, false, &cancel, &nothing).is_none()
+            } else {
+                beams::expose_beams(&exposure, &film, 16, &cancel, &nothing).is_none()
+            };
+            // One tile has 1024 rays in each of 64 passes, and a band of beams sixteen rows of 513.
+            // Each thread may be within a call of 256.
+            let traced = paths.traced.into_inner();
+            let most = 256 * rayon::current_num_threads();
+            assert!(is_none && traced > 0 && traced <= most, "{by_photons}: {traced}");
+        }
     }
 
     #[test]

@@ -5,7 +5,7 @@
 //! alone, so passes can be added at any time. Pixels outside the image, up to `margin_px` away,
 //! also send photons, because light from there reaches the image's edge.
 
-use super::{Film, PhotonTile, TILE, Tally};
+use super::{Film, PhotonTile, TILE, Tally, trace_unless_cancelled};
 use crate::optics::PlaneVector;
 use crate::path::{Exit, LightPaths, Start, Status};
 use crate::solids::Solids;
@@ -81,7 +81,8 @@ pub fn expose<const C: usize>(
             let mut done = ExposedFilm::default();
             if !cancel.load(Ordering::Relaxed) {
                 let end = [0, 1].map(|i| (corner[i] + i64::from(TILE)).min(limit[i]));
-                expose_tile(exposure, films, [corner, end], passes.clone(), keep, &mut done);
+                let area = [corner, end];
+                expose_tile(exposure, films, area, passes.clone(), keep, cancel, &mut done);
                 progress(done.tally.sent);
             }
             done
@@ -104,6 +105,7 @@ fn expose_tile<const C: usize>(
     [corner, end]: [[i64; 2]; 2],
     passes: Range<u32>,
     keep: bool,
+    cancel: &AtomicBool,
     done: &mut ExposedFilm<C>,
 ) {
     let framing = *films[0].framing();
@@ -156,7 +158,9 @@ fn expose_tile<const C: usize>(
 
         // Trace through the flow.
         let exits = &mut exits[..starts.len()];
-        exposure.paths.trace(&starts, exits);
+        if !trace_unless_cancelled(exposure.paths, &starts, exits, cancel) {
+            return;
+        }
 
         // Deposit on the film.
         let tile = &mut tiles[pass as usize % films.len()];

@@ -490,6 +490,10 @@ impl LightPaths for GpuPaths<'_> {
         &self.frame.view
     }
 
+    fn rays_at_once(&self) -> Option<usize> {
+        None
+    }
+
     fn quantities(&self) -> PathQuantities {
         self.options.quantities
     }

@@ -1,8 +1,10 @@
 //! Describes what a flow's file holds, and guesses what it means: which arrays give the index, and
 //! in which unit the coordinates are.
 
+use super::plausible::SIDES_M;
 use super::{InputError, with_data};
 use datasets::model::{DataArray, Dataset};
+use datasets::read::OpenOptions;
 use datasets::read::openfoam::BOUNDARY_PATCHES;
 use datasets::resample::{Mesh, Plane};
 use rt_core::math::median_high;
@@ -107,12 +109,10 @@ fn plain_name(name: &str) -> String {
     plain.to_owned()
 }
 
-/// Larger test sections are rather in millimetres, m.
-const LARGEST_SIDE_M: f64 = 20.0;
 /// Density of air at 15 °C and 1 atm, kg/m³, for densities relative to a free stream.
 const AIR_KG_M3: f64 = 1.225;
 
-/// Describes a file.
+/// Describes a file. `file` has what the file does not say itself.
 ///
 /// # Errors
 /// If it cannot be read.
@@ -122,7 +122,7 @@ const AIR_KG_M3: f64 = 1.225;
 /// ```no_run
 /// use schlieren::input::{Contents, Guess, contents};
 ///
-/// let Contents { arrays, guess, .. } = contents("flow.vtu".as_ref())?;
+/// let Contents { arrays, guess, .. } = contents("flow.vtu".as_ref(), &Default::default())?;
 /// for array in &arrays {
 ///     println!("{}: {:?}, {:?}", array.name, array.values, array.meaning);
 /// }
@@ -131,8 +131,8 @@ const AIR_KG_M3: f64 = 1.225;
 /// }
 /// # Ok::<(), schlieren::input::InputError>(())
 /// ```
-pub fn contents(path: &Path) -> Result<Contents, InputError> {
-    let (mut contents, warnings) = with_data(path, |data| Ok(contents_of_dataset(data)))?;
+pub fn contents(path: &Path, file: &OpenOptions) -> Result<Contents, InputError> {
+    let (mut contents, warnings) = with_data(path, file, |data| Ok(contents_of_dataset(data)))?;
     contents.notes.splice(0..0, warnings);
     Ok(contents)
 }
@@ -305,7 +305,7 @@ fn guess(c: &mut Contents, axisymmetric: bool) -> Option<Guess> {
     }
     let longest = size.into_iter().fold(0.0, f64::max);
     let mut length_unit_m = 1.0;
-    if longest > LARGEST_SIDE_M {
+    if longest > SIDES_M[1] {
         length_unit_m = 1e-3;
         options.push(("--length-unit", "0.001".into()));
         notes.push(format!(

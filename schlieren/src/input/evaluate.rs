@@ -133,12 +133,13 @@ fn by_density(
             let value = if s.high > high { s.high } else { s.low };
             report.warnings.push(format!(
                 "density {value} kg/m^3 is not one of a gas in a wind tunnel ({low}..{high}); give \
-                 the unit of the file as a scale, such as 1000 for g/cm^3"
+                 the unit of the file as flow.density_unit_kg_m3, such as 1000 for g/cm^3"
             ));
         } else if (s.median - 1.0).abs() < NORMALISED && s.low < s.high {
             report.warnings.push(
                 "the density is 1 at most points, so it is probably normalised by the free stream; \
-                 give the free stream's density in kg/m^3 as its scale, such as 1.2".into(),
+                 give the free stream's density in kg/m^3 as flow.density_unit_kg_m3, such as 1.2"
+                    .into(),
             );
         }
     }
@@ -241,15 +242,15 @@ fn plausible(t: &Option<Spread>, p: &Option<Spread>, report: &mut Report) {
         let [low, high] = PLAUSIBLE_TEMPERATURE;
         if (CELSIUS_SUSPECT[0]..CELSIUS_SUSPECT[1]).contains(&s.median) {
             report.warnings.push(format!(
-                "the temperature is {:.1} K at the median: if it is in degrees Celsius, set the \
-                 offset 273.15",
+                "the temperature is {:.1} K at the median: if it is in degrees Celsius, set \
+                 flow.temperature_zero_k to 273.15",
                 s.median
             ));
         } else if s.low < low || s.high > high {
             let value = if s.high > high { s.high } else { s.low };
             report.warnings.push(format!(
-                "temperature {value} K is not plausible ({low}..{high}); give its unit as scale \
-                 and offset"
+                "temperature {value} K is not plausible ({low}..{high}); check the array, and \
+                 flow.temperature_zero_k"
             ));
         }
     }
@@ -258,9 +259,9 @@ fn plausible(t: &Option<Spread>, p: &Option<Spread>, report: &mut Report) {
         if s.low < low || s.high > high {
             let value = if s.high > high { s.high } else { s.low };
             report.warnings.push(format!(
-                "pressure {value} Pa is not plausible ({low}..{high}); \
-                                          give its unit as a scale (100000 for bar), and 101325 as \
-                                          offset when it is relative to the atmosphere"
+                "pressure {value} Pa is not plausible ({low}..{high}); give its unit as \
+                 flow.pressure_unit_pa (100000 for bar); one relative to the atmosphere has to be \
+                 made absolute first"
             ));
         }
     }

@@ -4,8 +4,8 @@ use super::cell_averages::to_middle_values;
 use super::{Depth, InputError, Options};
 use datasets::model::{Attributes, ColorBy, Dataset, extent_dims};
 use datasets::resample::{
-    self, Lattice, Mark, Mesh, Plane, Reconstruction, Report, Resolution, Samples,
-    resample as resample_mesh, revolve, revolved_bounds,
+    self, Lattice, Mark, Mesh, Plane, Reconstruction, Report, Resolution, Samples, Walls,
+    in_bodies, resample as resample_mesh, revolve, revolved_bounds,
 };
 use glam::{DMat3, DVec3};
 
@@ -115,6 +115,24 @@ impl SamplePoints {
                 (0..lattice.len()).map(|i| of(a, source(i))).collect()
             }
         }
+    }
+
+    /// Which nodes outside the mesh are in bodies; `None` when that makes no difference.
+    pub(super) fn bodies(
+        &self,
+        data: &Dataset,
+        on: &LatticeValues,
+        options: &Options,
+        report: &mut super::Report,
+    ) -> Option<Vec<bool>> {
+        let SamplePoints::Mesh { mesh, .. } = self else { return None };
+        if options.outside != super::Outside::Auto || !on.marks.contains(&Mark::Outside) {
+            return None;
+        }
+        let revolved = options.depth == Some(Depth::Revolve);
+        let walls = Walls::find(mesh, data, revolved);
+        report.outside.get_or_insert_default().walls_by = walls.evidence().to_vec();
+        Some(in_bodies(mesh, &walls, &on.lattice, &on.marks, revolved))
     }
 
     /// Converts values at the points to values on a lattice.

@@ -18,7 +18,8 @@ pub fn load_media(
     quantities: &[(Property, Quantity)],
     field: &Field,
 ) -> Result<Media, InputError> {
-    Ok(with_data(path, |data| media_from_dataset(data, options, quantities, field))?.0)
+    Ok(with_data(path, &options.file, |data| media_from_dataset(data, options, quantities, field))?
+        .0)
 }
 
 /// Creates properties of the medium from the arrays of a data set. Constants apply to all of

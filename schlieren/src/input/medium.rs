@@ -221,6 +221,9 @@ impl Medium {
                     Source::Constant(x) => Column::Constant(x * q.scale + q.offset),
                     Source::Array(name) => {
                         let color = ColorBy::find(data, name)?;
+                        if !matches!(self, Medium::Multifield { .. }) {
+                            refuse_vector(data, name, &color)?;
+                        }
                         let mut values = points.values(data, &color);
                         if (q.scale, q.offset) != (1.0, 0.0) {
                             values.iter_mut().for_each(|v| *v = *v * q.scale + q.offset);
@@ -230,5 +233,19 @@ impl Medium {
                 })
             })
             .collect()
+    }
+}
+
+/// Refuses an array of several components where one number is meant. Its magnitude is hardly ever
+/// a density or a temperature.
+fn refuse_vector(data: &Dataset, name: &str, color: &ColorBy) -> Result<(), InputError> {
+    let array = data.leaves().into_iter().filter_map(|d| d.attributes()).find_map(|a| {
+        if color.per_point { a.point_array(&color.name) } else { a.cell_array(&color.name) }
+    });
+    match array.map_or(1, |a| a.components) {
+        // `U:magnitude` asks for it.
+        1 => Ok(()),
+        _ if color.component.is_some() || color.name != name => Ok(()),
+        n => Err(InputError::Vector { name: name.into(), components: n }),
     }
 }

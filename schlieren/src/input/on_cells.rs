@@ -2,13 +2,13 @@
 
 use super::lattice::SamplePoints;
 use super::{
-    Depth, InputError, MOST_N_MINUS_1, Options, Reference, Report, Role, evaluate, reference,
-    with_data,
+    Depth, InputError, MOST_N_MINUS_1, Options, Outside, OutsideReport, Reference, Report, Role,
+    evaluate, plausible, reference, with_data,
 };
 use crate::field::LENGTHS_M;
 use crate::gas_on_cells::GasOnCells;
 use datasets::model::Dataset;
-use datasets::resample::{CellField, Resolution, Samples};
+use datasets::resample::{CellField, Resolution, Samples, Walls};
 use std::path::Path;
 
 /// Reads a file as gas on the cells of its mesh. See [`cells_from_dataset`].
@@ -16,7 +16,8 @@ use std::path::Path;
 /// # Errors
 /// As [`cells_from_dataset`], and if the file cannot be read.
 pub fn load_cells(path: &Path, options: &Options) -> Result<(GasOnCells, Report), InputError> {
-    let (mut loaded, warnings) = with_data(path, |data| cells_from_dataset(data, options))?;
+    let (mut loaded, warnings) =
+        with_data(path, &options.file, |data| cells_from_dataset(data, options))?;
     loaded.1.warnings.splice(0..0, warnings);
     Ok(loaded)
 }
@@ -54,7 +55,12 @@ pub fn cells_from_dataset(
             });
         }
     }
-    let cells = CellField::new(mesh, samples, options.reconstruction)?;
+    let walls = match options.outside {
+        Outside::Auto => Walls::find(&mesh, data, false),
+        _ => Walls::default(),
+    };
+    plausible::warn_size(high - low, &mut report);
+    let cells = CellField::with_walls(mesh, samples, options.reconstruction, walls.of_points())?;
     report.warnings.extend(cells.report().warnings());
     report.cells = Some(*cells.report());
     let largest = cells.largest() + background;
@@ -75,28 +81,23 @@ pub fn cells_from_dataset(
         }),
     };
     report.reference_n_minus_1 = background + d0;
-    warn_outside(&cells, options, &mut report);
+    report_outside(&cells, &walls, options, &mut report);
     let n0 = 1.0 + background + d0;
-    Ok((GasOnCells::new(cells, d0, n0, options.outside.node(), options.hidden.node()), report))
+    let [open, behind_wall] = options.outside.roles().map(Role::node);
+    let gas = GasOnCells::new(cells, d0, n0, open, options.hidden.node());
+    Ok((gas.with_walls(behind_wall), report))
 }
 
-fn warn_outside(cells: &CellField, options: &Options, report: &mut Report) {
-    let outside = 100.0 * (1.0 - cells.report().filled);
+fn report_outside(cells: &CellField, walls: &Walls, options: &Options, report: &mut Report) {
+    let percent = 100.0 * (1.0 - cells.report().filled);
     // Rounding of the corners, and curved faces.
-    if outside < 0.05 {
+    if percent < 0.05 {
         return;
     }
-    match options.outside {
-        Role::Blank => report.warnings.push(format!(
-            "{outside:.1} % of the mesh's box lie outside the mesh and are blank; set --outside \
-             solid (a body) or gas (undisturbed flow)"
-        )),
-        Role::Gas => report.warnings.push(format!(
-            "{outside:.1} % of the mesh's box lie outside the mesh and are taken as undisturbed \
-             flow; where a body is there, set --outside solid"
-        )),
-        Role::Solid => {}
-    }
+    let walls_by = walls.evidence().to_vec();
+    let found = OutsideReport { percent, bodies_percent: None, walls_by };
+    report.warnings.extend(found.warning(options.outside, "mesh's box"));
+    report.outside = Some(found);
 }
 
 /// Refuses what only a lattice has.
@@ -111,6 +112,7 @@ fn refuse_lattice_options(options: &Options) -> Result<(), InputError> {
         ),
         (options.samples_per_axis != 1, "several samples a node", "omit them"),
         (options.smoothing_nodes != 0.0, "smoothing over nodes", "omit it"),
+        (options.average_jumps, "jumps from node to node", "omit average_jumps"),
     ];
     match given.into_iter().find(|g| g.0) {
         None => Ok(()),

@@ -1,7 +1,8 @@
 //! Chooses n0, the index of the reference medium around the field.
 
 use super::lattice::LatticeValues;
-use super::{InputError, Options, Report, Role};
+use super::{InputError, Options, Report};
+use crate::field::Node;
 use datasets::resample::Mark;
 use rt_core::math::median_high;
 
@@ -100,14 +101,12 @@ pub(super) fn continued(
     mut eps: Vec<f32>,
     dims: [usize; 3],
     marks: &[Mark],
-    options: &Options,
+    nodes: Option<&[Node]>,
 ) -> Vec<f32> {
-    let open = |m: Mark| match m {
-        Mark::Outside => options.outside == Role::Gas,
-        Mark::Hidden => options.hidden == Role::Gas,
-        _ => false,
-    };
-    if !marks.iter().any(|&m| open(m)) {
+    let Some(nodes) = nodes else { return eps };
+    let open: Vec<bool> =
+        marks.iter().zip(nodes).map(|(m, n)| *m != Mark::Inside && *n == Node::Gas).collect();
+    if !open.contains(&true) {
         return eps;
     }
     let stride = [1, dims[0], dims[0] * dims[1]];
@@ -121,7 +120,7 @@ pub(super) fn continued(
     };
     let mut known: Vec<bool> = marks.iter().map(|&m| m == Mark::Inside).collect();
     let mut layer: Vec<usize> =
-        (0..eps.len()).filter(|&i| open(marks[i]) && neighbours(i).any(|j| known[j])).collect();
+        (0..eps.len()).filter(|&i| open[i] && neighbours(i).any(|j| known[j])).collect();
     while !layer.is_empty() {
         let new: Vec<f32> = layer
             .iter()
@@ -134,18 +133,15 @@ pub(super) fn continued(
         for (&i, v) in layer.iter().zip(new) {
             (eps[i], known[i]) = (v, true);
         }
-        let mut next: Vec<usize> = layer
-            .iter()
-            .flat_map(|&i| neighbours(i))
-            .filter(|&j| !known[j] && open(marks[j]))
-            .collect();
+        let mut next: Vec<usize> =
+            layer.iter().flat_map(|&i| neighbours(i)).filter(|&j| !known[j] && open[j]).collect();
         next.sort_unstable();
         next.dedup();
         layer = next;
     }
     // Pockets that the continuation does not reach get the reference index.
     for (i, e) in eps.iter_mut().enumerate() {
-        if open(marks[i]) && !known[i] {
+        if open[i] && !known[i] {
             *e = 0.0;
         }
     }

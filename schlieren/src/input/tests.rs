@@ -1,4 +1,5 @@
 use super::*;
+use crate::field::Node;
 use crate::index::ciddor::{Ciddor, MoistAir};
 use crate::index::multifield::{Rule, TransferFunction};
 use datasets::model::{
@@ -247,6 +248,7 @@ fn curvilinear_data_is_resampled_with_mask_and_error() {
     let options = Options {
         resolution: Resolution::Longest(64),
         reference: Reference::Given { n_minus_1: K_AIR },
+        outside: Outside::Blank,
         ..Options::new(Medium::density("rho"))
     };
     let LoadedField { field, report } = from_dataset(&annulus(), &options).unwrap();
@@ -261,9 +263,8 @@ fn curvilinear_data_is_resampled_with_mask_and_error() {
         "{r:?}"
     );
     assert!(report.warnings.iter().any(|w| w.contains("outside the mesh and are blank")));
-    for (role, node) in [(Role::Solid, Node::Solid), (Role::Gas, Node::Gas)] {
-        let other =
-            from_dataset(&annulus(), &Options { outside: role, ..options.clone() }).unwrap();
+    for (outside, node) in [(Outside::Solid, Node::Solid), (Outside::Gas, Node::Gas)] {
+        let other = from_dataset(&annulus(), &Options { outside, ..options.clone() }).unwrap();
         assert!(other.field.count(node) >= r.outside);
         assert_eq!(other.field.count(Node::Blank), 0);
         assert!(other.field.eps().iter().all(|e| e.is_finite()));

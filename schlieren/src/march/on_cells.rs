@@ -286,6 +286,7 @@ impl Piecewise<'_, '_> {
                 if progress { (0, self.ray.tau_m) } else { (stuck + 1, farthest_m) };
             before = match beyond {
                 Beyond::Hidden => gas.hidden,
+                Beyond::Wall => gas.walls,
                 Beyond::Cell(_) | Beyond::Outside => gas.outside,
             };
             (from, inside) = (inside, beyond);
@@ -329,7 +330,8 @@ impl Piecewise<'_, '_> {
         let left_m = clip(at_m - self.paths.low_m, direction, self.paths.size_m)[1].max(0.0);
         let stretch_m = entry.map_or(left_m, |e| e.distance);
         let after = match entry {
-            Some(e) if e.from_hidden => gas.hidden,
+            Some(e) if e.from == Beyond::Hidden => gas.hidden,
+            Some(e) if e.from == Beyond::Wall => gas.walls,
             _ => gas.outside,
         };
         if stretch_m > gap_m {

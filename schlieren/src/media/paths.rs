@@ -59,6 +59,10 @@ impl LightPaths for AttenuatedPaths<'_> {
         self.paths.view()
     }
 
+    fn rays_at_once(&self) -> Option<usize> {
+        self.paths.rays_at_once()
+    }
+
     fn quantities(&self) -> PathQuantities {
         self.paths.quantities()
     }

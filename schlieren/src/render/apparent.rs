@@ -15,7 +15,7 @@ const CLOSE_PX: f64 = 1e-4;
 /// Displacement of the dot at each pixel's centre in the undisturbed image, along right and up, in
 /// metres in the test section. NaN where the dot is not seen: behind a body, outside the image, or
 /// where light crosses.
-pub(super) fn displacements(
+pub(crate) fn displacements(
     framing: &Framing,
     shifts_m: &[[f32; 2]],
     transmission: &[f32],

@@ -1,9 +1,10 @@
 //! Traces the deflection map, with one ray through the centre of every pixel, for comparison with
 //! measurements and other programs.
 
-use crate::film::Framing;
+use crate::film::{Framing, trace_parallel_unless_cancelled};
 use crate::optics::Optics;
 use crate::path::{Exit, LightPaths, Status};
+use std::sync::atomic::AtomicBool;
 
 /// Results of the rays through the pixels' centres, row by row from the top.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -29,7 +30,8 @@ pub struct Map {
     pub dark: usize,
 }
 
-/// Traces the map. `blocked` returns whether a body blocks a start's ray.
+/// Traces the map. `blocked` returns whether a body blocks a start's ray. `None` when `cancel` was
+/// set.
 pub(crate) fn map(
     paths: &dyn LightPaths,
     optics: &Optics,
@@ -37,10 +39,14 @@ pub(crate) fn map(
     wavelength_m: f64,
     n0: f64,
     blocked: impl Fn(&crate::path::Start) -> bool,
-) -> Map {
+    cancel: &AtomicBool,
+) -> Option<Map> {
     let starts = framing.pixel_centers();
     let mut exits = vec![Exit::UNDISTURBED; starts.len()];
-    paths.trace_parallel(&starts, &mut exits);
+    let whole = trace_parallel_unless_cancelled(paths, &starts, &mut exits, cancel, &|_| ());
+    if !whole {
+        return None;
+    }
     let mut map = Map::default();
     for (start, exit) in starts.iter().zip(&exits) {
         let [dx, dy] = exit.deflection_rad;
@@ -62,5 +68,5 @@ pub(crate) fn map(
             map.largest_displacement_m = map.largest_displacement_m.max(size(exit.displacement_m));
         }
     }
-    map
+    Some(map)
 }

@@ -36,6 +36,7 @@ mod section;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use apparent::displacements as apparent_displacements;
 pub use map::Map;
 pub use media::MediaMap;
 pub use on_gpu::check_gpu;
@@ -326,7 +327,7 @@ pub fn render(
                 section.paths_of(scene, 0, quantities, against_light, accuracy)?
             }
         };
-        add_map(scene, section, &planned, &mut r);
+        add_map(scene, section, &planned, control, &mut r)?;
         media::add_map(scene, section, &planned, &mut r)?;
     }
     media::warn(scene, layers, &mut r.report.warnings);
@@ -397,11 +398,19 @@ pub fn technique(
     })
 }
 
-fn add_map(scene: &Scene, section: &TestSection, planned: &PlannedPaths<'_>, r: &mut RenderOutput) {
+fn add_map(
+    scene: &Scene,
+    section: &TestSection,
+    planned: &PlannedPaths<'_>,
+    control: &Control<'_>,
+    r: &mut RenderOutput,
+) -> Result<(), RenderError> {
     let blocked = |s: &Start| section.solids.as_ref().is_some_and(|b| b.block(&section.view, s));
     let wavelength_m = scene.light.wavelengths_nm[0] * 1e-9;
     let n0 = section.n0(0);
-    let mut m = map::map(&*planned.paths, &scene.optics(), &r.framing, wavelength_m, n0, blocked);
+    let (paths, optics) = (&*planned.paths, scene.optics());
+    let mut m = map::map(paths, &optics, &r.framing, wavelength_m, n0, blocked, control.cancel)
+        .ok_or(RenderError::Cancelled)?;
     if matches!(scene.technique, TechniqueSpec::Bos { .. }) {
         m.apparent_m = apparent::displacements(&r.framing, &m.displacement_m, &m.transmission);
     }
@@ -439,6 +448,7 @@ fn add_map(scene: &Scene, section: &TestSection, planned: &PlannedPaths<'_>, r: 
         }
     }
     r.map = Some(m);
+    Ok(())
 }
 
 /// Warns about images that show nothing: they are correct but rarely wanted.

@@ -259,7 +259,7 @@ fn a_device_that_failed_on_the_way_is_a_warning_of_the_image_reported_once() {
         let planned = PlannedPaths { paths: Box::new(Failed(planned.paths)), ..planned };
         let mut r = rendered(&format!("{SMALL}[technique]\nkind = \"{technique}\""), Layers::NONE);
         for _ in 0..2 {
-            add_map(&s, &section, &planned, &mut r);
+            add_map(&s, &section, &planned, &Control::default(), &mut r).unwrap();
         }
         let warning = r
             .report

@@ -78,6 +78,10 @@ impl Scene {
         flow.density_unit_kg_m3.map_or(Ok(()), |s| positive("flow.density_unit_kg_m3", s))?;
         flow.pressure_unit_pa.map_or(Ok(()), |s| positive("flow.pressure_unit_pa", s))?;
         flow.span.map_or(Ok(()), |s| positive("flow.span", s))?;
+        for h in flow.spacing.into_iter().flatten() {
+            positive("flow.spacing", h)?;
+        }
+        finite("flow.origin", &flow.origin.unwrap_or_default())?;
         finite("flow.temperature_zero_k", &[flow.temperature_zero_k.unwrap_or(0.0)])?;
         within("flow.smoothing_nodes", flow.smoothing_nodes, 0.0, 100.0)?;
         within("flow.resample_samples", flow.resample_samples as f64, 1.0, 8.0)?;

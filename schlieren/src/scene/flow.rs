@@ -4,7 +4,8 @@ use super::SceneError;
 use crate::index::Gas;
 use crate::index::conditions::Model;
 use crate::index::multifield::{Rule, TransferFunction};
-use crate::input::{Depth, Medium, Options, Quantity, Reference, Role};
+use crate::input::{Depth, Medium, Options, Outside, Quantity, Reference, Role};
+use datasets::read::OpenOptions;
 use datasets::resample::{Reconstruction, Resolution};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -61,6 +62,13 @@ pub struct FlowSpec {
     /// Metres per unit of the file's coordinates.
     #[serde(default = "one")]
     pub length_unit_m: f64,
+    /// Distance between points along x, y and z, in units of the file, where it does not say it
+    /// (NumPy, raw, NRRD, MetaImage, NetCDF without coordinates).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub spacing: Option<[f64; 3]>,
+    /// Position of the first point of such a file, in its units.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub origin: Option<[f64; 3]>,
     /// Depth to which two-dimensional data are extruded, in units of the file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub span: Option<f64>,
@@ -86,10 +94,13 @@ pub struct FlowSpec {
     /// Standard deviation of the smoothing of shocks, in nodes; 0 for none.
     #[serde(default)]
     pub smoothing_nodes: f64,
-    /// What the region outside the mesh is. When absent, it is undisturbed gas around a revolved
-    /// flow, which a box holds with its corners empty, and blank otherwise.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub outside: Option<Role>,
+    /// Whether jumps from one node to the next become averages over cells.
+    #[serde(default)]
+    pub average_jumps: bool,
+    /// What the region outside the mesh is: behind walls bodies and behind an open border gas
+    /// (`auto`), or one of both, or blank, everywhere.
+    #[serde(default)]
+    pub outside: Outside,
     /// What cells hidden by the solver are.
     #[serde(default = "solid")]
     pub hidden: Role,
@@ -151,6 +162,8 @@ impl Default for FlowSpec {
             species: BTreeMap::new(),
             model: Model::Auto,
             length_unit_m: one(),
+            spacing: None,
+            origin: None,
             span: None,
             revolve: false,
             resample_nodes: None,
@@ -158,7 +171,8 @@ impl Default for FlowSpec {
             on_cells: false,
             reconstruction: Reconstruction::default(),
             smoothing_nodes: 0.0,
-            outside: None,
+            average_jumps: false,
+            outside: Outside::Auto,
             hidden: solid(),
             reference_n_minus_1: None,
         }
@@ -178,6 +192,8 @@ impl FlowSpec {
         FlowSpec {
             file: self.file.clone(),
             length_unit_m: self.length_unit_m,
+            spacing: self.spacing,
+            origin: self.origin,
             span: self.span,
             revolve: self.revolve,
             resample_nodes: self.resample_nodes,
@@ -185,15 +201,11 @@ impl FlowSpec {
             on_cells: self.on_cells,
             reconstruction: self.reconstruction,
             smoothing_nodes: self.smoothing_nodes,
+            average_jumps: self.average_jumps,
             outside: self.outside,
             hidden: self.hidden,
             ..FlowSpec::default()
         }
-    }
-
-    /// What the region outside the mesh is: as given, or the default.
-    pub fn outside_role(&self) -> Role {
-        self.outside.unwrap_or(if self.revolve { Role::Gas } else { Role::Blank })
     }
 
     /// The quantities that determine the index.
@@ -308,6 +320,11 @@ impl FlowSpec {
         Ok(Medium::Multifield { parts, rule: spec.rule })
     }
 
+    /// What the file does not say itself.
+    pub fn open_options(&self) -> OpenOptions {
+        OpenOptions { time: None, spacing: self.spacing, origin: self.origin }
+    }
+
     /// Options for reading the file as a field for light of this wavelength.
     ///
     /// # Errors
@@ -315,6 +332,7 @@ impl FlowSpec {
     pub fn options(&self, wavelength_nm: f64) -> Result<Options, SceneError> {
         let border = Reference::Border;
         Ok(Options {
+            file: self.open_options(),
             wavelength_nm,
             model: self.model,
             length_unit_m: self.length_unit_m,
@@ -323,7 +341,8 @@ impl FlowSpec {
             samples_per_axis: self.resample_samples,
             reconstruction: self.reconstruction,
             smoothing_nodes: self.smoothing_nodes,
-            outside: self.outside_role(),
+            average_jumps: self.average_jumps,
+            outside: self.outside,
             hidden: self.hidden,
             reference: self
                 .reference_n_minus_1
@@ -336,14 +355,6 @@ impl FlowSpec {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn around_a_revolved_flow_is_gas_unless_something_else_is_asked_for() {
-        let flow = |revolve, outside| FlowSpec { revolve, outside, ..FlowSpec::default() };
-        assert_eq!(flow(true, None).outside_role(), Role::Gas);
-        assert_eq!(flow(false, None).outside_role(), Role::Blank);
-        assert_eq!(flow(true, Some(Role::Solid)).outside_role(), Role::Solid);
-    }
 
     fn flow(text: &str) -> Result<Medium, String> {
         let spec: FlowSpec =

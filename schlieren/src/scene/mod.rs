@@ -494,7 +494,6 @@ impl Scene {
     #[must_use]
     pub fn effective(&self) -> Scene {
         let mut s = self.clone();
-        s.flow.outside = Some(self.flow.outside_role());
         let t = &self.technique;
         if t.uses_source() {
             let optics = self.optics();

@@ -37,6 +37,13 @@ impl Scene {
                 "counts in nodes of a lattice",
             ),
             (
+                "flow.average_jumps",
+                "--smoothing",
+                flow.average_jumps,
+                "true".into(),
+                "looks for jumps from node to node of a lattice",
+            ),
+            (
                 "technique.kind",
                 "--technique",
                 matches!(
@@ -112,6 +119,7 @@ mod tests {
             ("resample_nodes = 64", "flow.resample_nodes is 64", "--resample"),
             ("resample_samples = 2", "flow.resample_samples", "--resample-samples"),
             ("smoothing_nodes = 1.0", "flow.smoothing_nodes is 1", "--smoothing"),
+            ("average_jumps = true", "flow.average_jumps is true", "--smoothing"),
             ("[technique]\nkind = \"volume\"", "technique.kind is volume", "--technique"),
             ("[technique]\nkind = \"slice\"", "technique.kind is slice", "--technique"),
             ("[march]\ndevice = \"gpu\"", "march.device is gpu", "--device"),

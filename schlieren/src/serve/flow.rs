@@ -7,6 +7,7 @@ use crate::render::{RenderError, TestSection};
 use crate::scene::Scene;
 use crate::solids::Solids;
 use datasets::model::Dataset;
+use datasets::read::OpenOptions;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -30,9 +31,9 @@ pub(super) struct Flow {
 
 impl Flow {
     /// Reads a file; of a collection, the first time.
-    pub(super) fn open(path: &Path) -> Result<Flow, InputError> {
+    pub(super) fn open(path: &Path, open: &OpenOptions) -> Result<Flow, InputError> {
         let file = path.to_path_buf();
-        let (data, warnings) = crate::input::dataset(path)?;
+        let (data, warnings) = crate::input::dataset(path, open)?;
         Ok(Flow { data, warnings, file })
     }
 

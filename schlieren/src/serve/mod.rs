@@ -97,7 +97,8 @@ pub fn serve(
     if let Some(first) = steps.first() {
         scene.flow.file.clone_from(&first.path);
     }
-    let flow = flow::Flow::open(&scene.flow.file).map_err(RenderError::from)?;
+    let flow = flow::Flow::open(&scene.flow.file, &scene.flow.open_options())
+        .map_err(RenderError::from)?;
     let mut solids = None;
     if !scene.solids.files.is_empty() {
         solids = Some(Solids::open(&scene.solids.files).map_err(RenderError::from)?.0);

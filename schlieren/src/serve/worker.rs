@@ -251,7 +251,7 @@ impl Worker {
                 self.solids = old.full.solids;
             }
             if self.flow.file != scene.flow.file {
-                self.flow = Flow::open(&scene.flow.file)?;
+                self.flow = Flow::open(&scene.flow.file, &scene.flow.open_options())?;
             }
             let mut of_series = scene.clone();
             of_series.flow.reference_n_minus_1 = self.reference_n_minus_1(scene)?;
@@ -292,7 +292,8 @@ impl Worker {
         let known = self.reference.as_ref().filter(|r| r.0 == first.flow && r.1 == wavelength_nm);
         let n_minus_1 = match known {
             Some((_, _, n_minus_1)) => *n_minus_1,
-            None => Flow::open(&first.flow.file)?.reference_n_minus_1(&first)?,
+            None => Flow::open(&first.flow.file, &first.flow.open_options())?
+                .reference_n_minus_1(&first)?,
         };
         self.reference = Some((first.flow, wavelength_nm, n_minus_1));
         self.session.lock().reference = Some((scene.flow.clone(), n_minus_1));
@@ -356,7 +357,9 @@ impl Worker {
                 wavelength_m,
                 n0,
                 blocked,
-            );
+                &AtomicBool::new(false),
+            )
+            .ok_or(RenderError::Cancelled)?;
             Ok::<_, RenderError>(Arc::new(DeflectionMap { map, framing }))
         })??;
         if !level.draft {

@@ -131,6 +131,10 @@ impl LightPaths for ReversedPaths<'_> {
         &self.view
     }
 
+    fn rays_at_once(&self) -> Option<usize> {
+        self.paths.rays_at_once()
+    }
+
     fn quantities(&self) -> PathQuantities {
         self.paths.quantities()
     }

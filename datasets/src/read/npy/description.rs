@@ -40,7 +40,7 @@ impl Placement {
     pub(super) fn cure(&self) -> String {
         let name = self.description.file_name().unwrap_or_default().to_string_lossy();
         format!(
-            "write a file {name} beside it with the line `spacing = [dx, dy, dz]`, or save it by \
+            "give --spacing DX,DY,DZ, write a file {name} beside it with the line `spacing = [dx, dy, dz]`, or save it by \
              numpy.savez with arrays x, y and z of coordinates"
         )
     }

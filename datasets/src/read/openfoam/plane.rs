@@ -2,7 +2,7 @@
 //! of type `empty` (a plane flow) or `wedge` (an axisymmetric one). They become polygons in the
 //! plane.
 
-use super::poly_mesh::{Patch, PolyMesh};
+use super::poly_mesh::{Patch, PolyMesh, wall_points};
 use crate::model::{Cells, Points, UnstructuredGrid};
 use glam::{DMat3, DVec3};
 
@@ -156,6 +156,9 @@ fn polygons(
         });
         grid.cells.push(ids);
     }
+    let is_wall = mesh.wall_points();
+    let walls = new_id.iter().zip(&is_wall).filter(|(id, wall)| **wall && **id != Cells::NO_POINT);
+    grid.attributes.field.push(wall_points(walls.map(|(id, _)| *id)));
     grid.points = Points::F64(points);
     grid
 }

@@ -1,7 +1,7 @@
 //! The mesh of a case: faces, and the cells on their two sides.
 
 use super::text::FoamFile;
-use crate::model::Cells;
+use crate::model::{Cells, DataArray, Values, WALL_POINTS, is_name_of_body};
 use crate::read::ReadError;
 use crate::read::error::{At, BROKEN, Fault};
 use std::collections::HashMap;
@@ -32,7 +32,33 @@ pub(super) struct Patch {
     pub(super) faces: std::ops::Range<usize>,
 }
 
+impl Patch {
+    /// Whether the patch is a body: by its type, or by its name where cases of inviscid flows give
+    /// bodies the type of any patch or of a symmetry.
+    pub(super) fn is_wall(&self) -> bool {
+        let kind = self.kind.to_lowercase();
+        let any = ["patch", "slip", "symmetry", "symmetryplane"].contains(&kind.as_str());
+        kind.contains("wall") || any && is_name_of_body(&self.name)
+    }
+}
+
+/// The list of the points of walls as field data.
+pub(super) fn wall_points(ids: impl Iterator<Item = u32>) -> DataArray {
+    DataArray::new(WALL_POINTS, 1, Values::U32(ids.collect()))
+}
+
 impl PolyMesh {
+    /// Flag per point: whether it is one of a wall.
+    pub(super) fn wall_points(&self) -> Vec<bool> {
+        let mut is_wall = vec![false; self.points.len()];
+        for patch in self.patches.iter().filter(|p| p.is_wall()) {
+            for face in patch.faces.clone() {
+                self.faces.get(face).iter().for_each(|&k| is_wall[k as usize] = true);
+            }
+        }
+        is_wall
+    }
+
     /// Reads the five files; `file` tells where each is.
     pub(super) fn read(file: impl Fn(&str) -> PathBuf) -> Result<PolyMesh, ReadError> {
         let open = |name: &str| FoamFile::open(&file(name), None);

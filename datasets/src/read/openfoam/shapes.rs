@@ -1,7 +1,7 @@
 //! Cells with the shapes that have a name: tetrahedra, hexahedra, wedges and pyramids are found by
 //! their faces; the others stay polyhedra.
 
-use super::poly_mesh::PolyMesh;
+use super::poly_mesh::{PolyMesh, wall_points};
 use crate::model::{Cells, Points, UnstructuredGrid};
 
 const TETRA: u8 = 10;
@@ -40,6 +40,8 @@ pub(super) fn solid_cells(mesh: PolyMesh) -> UnstructuredGrid {
     if grid.polyhedron_faces.is_empty() {
         grid.faces_of_cell.clear();
     }
+    let walls = mesh.wall_points().into_iter().enumerate().filter(|w| w.1);
+    grid.attributes.field.push(wall_points(walls.map(|(id, _)| id as u32)));
     grid.points = Points::F64(mesh.points);
     grid
 }

@@ -1,7 +1,7 @@
 //! A tree of boxes over the faces at the border of a mesh, for the place where a line enters it.
 
 use super::Kind;
-use super::faces::{HIDDEN, Neighbours, OUTSIDE};
+use super::faces::{HIDDEN, Neighbours, OUTSIDE, WALL};
 use crate::resample::mesh::Mesh;
 use glam::DVec3;
 
@@ -24,8 +24,8 @@ struct Face {
     cell: u32,
     first: usize,
     count: u32,
-    /// Whether the solver hides the cell behind it.
-    hidden: bool,
+    /// What lies behind it: OUTSIDE, WALL or HIDDEN.
+    beyond: u32,
     /// Whether the ring runs clockwise, seen from outside the cell.
     clockwise: bool,
 }
@@ -47,8 +47,8 @@ pub(super) struct Passage {
     pub(super) cell: u32,
     /// Whether the line enters the cell, or leaves it.
     pub(super) inwards: bool,
-    /// Whether the solver hides the cell on the other side.
-    pub(super) hidden: bool,
+    /// What lies on the other side: OUTSIDE, WALL or HIDDEN.
+    pub(super) beyond: u32,
 }
 
 impl Border {
@@ -56,7 +56,7 @@ impl Border {
         let (mut faces, mut rings) = (Vec::new(), Vec::new());
         for (cell, kind) in kinds.iter().enumerate() {
             let beyond = neighbours.of_cell(cell);
-            let open = |b: &u32| *b == OUTSIDE || *b == HIDDEN;
+            let open = |b: &u32| [OUTSIDE, WALL, HIDDEN].contains(b);
             if matches!(kind, Kind::Hidden | Kind::LeftOut) || !beyond.iter().any(open) {
                 continue;
             }
@@ -74,7 +74,7 @@ impl Border {
                         cell: cell as u32,
                         first,
                         count: ring.len() as u32,
-                        hidden: beyond[number] == HIDDEN,
+                        beyond: beyond[number],
                         clockwise: normal.dot(centre) < 0.0,
                     });
                 }
@@ -214,7 +214,7 @@ impl Border {
                 return;
             }
             // At the same place, entering comes before leaving, and a cell before those after it.
-            let new = Passage { distance, cell: f.cell, inwards, hidden: f.hidden };
+            let new = Passage { distance, cell: f.cell, inwards, beyond: f.beyond };
             let key = |p: &Passage| (!p.inwards, p.cell);
             let better = best.is_none_or(|old| {
                 distance < old.distance || distance == old.distance && key(&new) < key(&old)

@@ -8,14 +8,16 @@ use crate::resample::mesh::Mesh;
 use rayon::prelude::*;
 
 /// Behind the face is no cell.
-pub(super) const OUTSIDE: u32 = u32::MAX;
+pub(in crate::resample) const OUTSIDE: u32 = u32::MAX;
 /// Behind the face is a cell that the solver hides.
 pub(super) const HIDDEN: u32 = u32::MAX - 1;
+/// Behind the face is a body.
+pub(super) const WALL: u32 = u32::MAX - 2;
 /// The face has no area: a side that collapsed.
-pub(super) const NO_FACE: u32 = u32::MAX - 2;
+pub(super) const NO_FACE: u32 = u32::MAX - 3;
 
 /// The cell behind each face.
-pub(super) struct Neighbours {
+pub(in crate::resample) struct Neighbours {
     /// Number of the first face of each cell.
     starts: Vec<usize>,
     /// In the order of `Shape::each_face`.
@@ -29,7 +31,7 @@ type FaceKey = (u32, [u32; 4]);
 
 impl Neighbours {
     /// `same` is the first of the points at the same place.
-    pub(super) fn of(mesh: &Mesh, same: &[u32], kinds: &[Kind]) -> Neighbours {
+    pub(in crate::resample) fn of(mesh: &Mesh, same: &[u32], kinds: &[Kind]) -> Neighbours {
         let per_cell: Vec<u32> = (0..mesh.num_cells())
             .into_par_iter()
             .map(|cell| {
@@ -87,8 +89,29 @@ impl Neighbours {
         Neighbours { starts, beyond, crowded }
     }
 
+    /// Takes those faces of the border whose corners are all points of walls as walls.
+    pub(super) fn mark_walls(&mut self, mesh: &Mesh, wall_points: &[bool]) {
+        for cell in 0..mesh.num_cells() {
+            let beyond = &mut self.beyond[self.starts[cell]..self.starts[cell + 1]];
+            if !beyond.contains(&OUTSIDE) {
+                continue;
+            }
+            let corners = mesh.corners(cell);
+            let mut number = 0;
+            corners.shape.each_face(|ring| {
+                let is_wall = |&i: &u32| {
+                    wall_points.get(corners.ids[i as usize] as usize).is_some_and(|w| *w)
+                };
+                if beyond[number] == OUTSIDE && ring.iter().all(is_wall) {
+                    beyond[number] = WALL;
+                }
+                number += 1;
+            });
+        }
+    }
+
     /// What lies behind the faces of a cell: a cell, or one of the constants.
-    pub(super) fn of_cell(&self, cell: usize) -> &[u32] {
+    pub(in crate::resample) fn of_cell(&self, cell: usize) -> &[u32] {
         &self.beyond[self.starts[cell]..self.starts[cell + 1]]
     }
 

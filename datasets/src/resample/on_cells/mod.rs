@@ -28,6 +28,7 @@ mod shares;
 mod tests;
 mod walker;
 
+pub(super) use faces::{Neighbours, OUTSIDE};
 pub use walker::{Beyond, CellWalker, Entry};
 
 use super::mesh::{Corners, Mesh};
@@ -36,7 +37,6 @@ use super::shape;
 use super::{ResampleError, Samples};
 use blend::Degree;
 use border::Border;
-use faces::Neighbours;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -46,7 +46,7 @@ const LEAST_VOLUME: f64 = 1e-15;
 
 /// What a cell holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
+pub(super) enum Kind {
     /// Values.
     Gas,
     /// No value, or not a finite one at a corner.
@@ -162,6 +162,20 @@ impl CellField {
         samples: Samples<'_>,
         reconstruction: Reconstruction,
     ) -> Result<CellField, ResampleError> {
+        CellField::with_walls(mesh, samples, reconstruction, &[])
+    }
+
+    /// As [`CellField::new`], for a mesh whose walls are known, by a flag for each point
+    /// ([`super::Walls::of_points`]): behind them lines meet [`Beyond::Wall`].
+    ///
+    /// # Errors
+    /// As [`CellField::new`].
+    pub fn with_walls(
+        mesh: Mesh,
+        samples: Samples<'_>,
+        reconstruction: Reconstruction,
+        wall_points: &[bool],
+    ) -> Result<CellField, ResampleError> {
         super::check_count(&mesh, samples)?;
         let averaged;
         let (values, of_cells) = match samples {
@@ -204,7 +218,8 @@ impl CellField {
                 cure: "check that the arrays hold finite numbers and the cells have volume",
             });
         }
-        let neighbours = Neighbours::of(&mesh, &first_at_place(&mesh), &kinds);
+        let mut neighbours = Neighbours::of(&mesh, &first_at_place(&mesh), &kinds);
+        neighbours.mark_walls(&mesh, wall_points);
         let border = Border::of(&mesh, &neighbours, &kinds);
         let (low, high) = mesh.bounds();
         let gas = shapes.iter().filter(|s| s.kind == Kind::Gas);

@@ -451,11 +451,11 @@ fn hidden_cells_are_seen_behind_faces_and_nan_cells_have_no_value() {
     // Cell 37 = 1 + 4 (1 + 4 · 2) is hidden.
     let start = DVec3::new(at(1.0), at(1.0), -1.0);
     let entry = walker.enter(start, DVec3::Z, 9.0, 0.0).unwrap();
-    assert!((entry.distance - 1.0).abs() < 1e-12 && !entry.from_hidden);
+    assert!((entry.distance - 1.0).abs() < 1e-12 && entry.from == Beyond::Outside);
     let place = start + DVec3::Z * 1.3;
     assert_eq!(walker.leave(21, place, DVec3::Z, Beyond::Cell(5)).unwrap().1, Beyond::Hidden);
     let again = walker.enter(start + DVec3::Z * 1.5, DVec3::Z, 9.0, 1e-6).unwrap();
-    assert!(again.from_hidden && (again.distance - 0.25).abs() < 1e-12, "{again:?}");
+    assert!(again.from == Beyond::Hidden && (again.distance - 0.25).abs() < 1e-12, "{again:?}");
     // Cell 40 = 0 + 4 (2 + 4 · 2).
     assert!(walker.sample(40, DVec3::new(at(0.0), at(2.0), at(2.0))).0.is_nan());
     assert!(walker.sample(41, DVec3::new(at(1.0), at(2.0), at(2.0))).0.is_finite());

@@ -3,7 +3,7 @@
 use super::CellField;
 use super::blend::{Degree, Share};
 use super::cell::PreparedCell;
-use super::faces::{HIDDEN, OUTSIDE};
+use super::faces::{HIDDEN, OUTSIDE, WALL};
 use super::shares::shares;
 use glam::DVec3;
 
@@ -22,8 +22,8 @@ pub struct Entry {
     pub distance: f64,
     /// The cell that it enters.
     pub cell: u32,
-    /// Whether it comes from a cell that the solver hides.
-    pub from_hidden: bool,
+    /// What it comes from.
+    pub from: Beyond,
 }
 
 /// What lies beyond the face through which a line leaves a cell.
@@ -33,8 +33,21 @@ pub enum Beyond {
     Cell(u32),
     /// No cell with which it shares the face.
     Outside,
+    /// A body, where the walls of the mesh are known.
+    Wall,
     /// A cell that the solver hides.
     Hidden,
+}
+
+impl Beyond {
+    fn of(number: u32) -> Beyond {
+        match number {
+            OUTSIDE => Beyond::Outside,
+            WALL => Beyond::Wall,
+            HIDDEN => Beyond::Hidden,
+            cell => Beyond::Cell(cell),
+        }
+    }
 }
 
 /// Follows lines through the cells of a field, one line at a time. It keeps the cells that it
@@ -91,12 +104,12 @@ impl<'a> CellWalker<'a> {
             Entry {
                 distance: passage.distance.max(0.0),
                 cell: passage.cell,
-                from_hidden: passage.hidden,
+                from: Beyond::of(passage.beyond),
             }
         } else {
             // The line leaves cells before it enters any, so it is inside: back to where it is.
             let (distance, cell, beyond) = self.back(at, direction, passage.distance, passage.cell);
-            Entry { distance, cell, from_hidden: beyond == Beyond::Hidden }
+            Entry { distance, cell, from: beyond }
         };
         (found.distance <= most).then_some(found)
     }
@@ -138,15 +151,11 @@ impl<'a> CellWalker<'a> {
         let from = match from {
             Beyond::Cell(cell) => cell,
             Beyond::Outside => OUTSIDE,
+            Beyond::Wall => WALL,
             Beyond::Hidden => HIDDEN,
         };
         let (distance, beyond) = self.prepared(cell).way_out(at, direction, from)?;
-        let beyond = match beyond {
-            OUTSIDE => Beyond::Outside,
-            HIDDEN => Beyond::Hidden,
-            cell => Beyond::Cell(cell),
-        };
-        Some((distance, beyond))
+        Some((distance, Beyond::of(beyond)))
     }
 
     /// A cell that a place is in, of those that are near a cell: its neighbours, and theirs.
