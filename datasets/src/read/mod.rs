@@ -32,6 +32,7 @@ pub(crate) mod volume;
 pub mod vtk_legacy;
 pub mod vtk_xml;
 pub(crate) mod vtkhdf;
+pub(crate) mod wedge;
 pub(crate) mod xdmf;
 
 pub use error::{At, ReadError};
