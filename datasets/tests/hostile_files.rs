@@ -394,7 +394,7 @@ fn deep_nesting_does_not_overflow_the_stack() {
 fn unknown_and_missing_files_are_named() {
     refused("a.h5", b"\x89HDF\r\n\x1a\n....", &["HDF5", "at byte 8", "version 46"]);
     let other = include_bytes!("files/old.h5");
-    refused("a.h5", other, &["neither VTKHDF nor NetCDF-4", "PLOT3D"]);
+    refused("a.h5", other, &["neither VTKHDF, NetCDF-4 nor CGNS", "PLOT3D"]);
     refused("empty.dat", b"", &["the file is empty"]);
     let e = open(Path::new("no/such/file.vti")).unwrap_err().to_string();
     assert!(e.contains("no/such/file.vti") && e.contains("check the name"), "{e}");

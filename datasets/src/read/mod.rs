@@ -6,6 +6,7 @@
 
 mod amrex;
 pub(crate) mod base64;
+pub(crate) mod cgns;
 pub mod csv;
 pub mod csv_lattice;
 mod ensight;
