@@ -5,7 +5,7 @@ mod sample_files;
 
 use datasets::read::{Content, LoadedFile, ReadError, open};
 use proptest::prelude::*;
-use sample_files::openfoam::{Form, case, decomposed, write};
+use sample_files::openfoam::{Form, case, collated, decomposed, write};
 use sample_files::{amrex, ensight};
 use std::path::Path;
 
@@ -207,10 +207,14 @@ proptest! {
     fn every_damage_to_an_openfoam_case_is_survived(
         form in prop::sample::select(vec![Form::Text, Form::Binary, Form::Zipped]),
         across in prop::sample::select(vec!["patch", "empty", "wedge"]),
-        in_parts in any::<bool>(),
+        parts in 0usize..4,
         damages in prop::collection::vec((any::<prop::sample::Index>(), damage()), 1..4),
     ) {
-        let mut files = if in_parts { decomposed(form) } else { case(form, across) };
+        let mut files = match parts {
+            0 => case(form, across),
+            1 => decomposed(form),
+            group => collated(form, group - 1),
+        };
         let count = files.len();
         damages.iter().for_each(|(file, d)| apply(&mut files[file.index(count)].1, d));
         let dir = tempfile::tempdir().unwrap();
