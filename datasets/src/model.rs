@@ -15,6 +15,7 @@ pub mod grid;
 pub mod lines;
 mod merge;
 pub mod polygon;
+pub(crate) mod shape_of_faces;
 pub mod surface;
 mod wall_names;
 

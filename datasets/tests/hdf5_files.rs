@@ -415,3 +415,65 @@ fn sets_of_exodus_are_not_left_out_in_silence() {
     assert_eq!(opened.format, "Exodus II");
     assert_eq!(opened.warnings, ["3 side sets (boundaries) left out"]);
 }
+
+/// Kinds of quadratic cells with their numbers of nodes.
+const QUADRATIC: [(&str, usize); 11] = [
+    ("Edge_3", 3),
+    ("Triangle_6", 6),
+    ("Quadrilateral_8", 8),
+    ("Quadrilateral_9", 9),
+    ("Tetrahedron_10", 10),
+    ("Pyramid_13", 13),
+    ("Wedge_15", 15),
+    ("Wedge_18", 18),
+    ("Hexahedron_20", 20),
+    ("Hexahedron_24", 24),
+    ("Hexahedron_27", 27),
+];
+
+#[test]
+fn nodes_of_quadratic_cells_of_xdmf_come_as_vtk_has_them() {
+    let Some(python) =
+        peer::python_with_vtk("nodes_of_quadratic_cells_of_xdmf_come_as_vtk_has_them")
+    else {
+        return;
+    };
+    let dir = tempfile::tempdir().unwrap();
+    let mut paths = Vec::new();
+    let mut expected = String::new();
+    for (kind, nodes) in QUADRATIC {
+        let points: Vec<String> =
+            (0..nodes).map(|i| format!("{i} {} {}", i * i % 7, i * i * i % 11)).collect();
+        // The nodes in another order than the points.
+        let ids: Vec<String> = (0..nodes).map(|i| ((i + 2) % nodes).to_string()).collect();
+        let text = format!(
+            "<?xml version=\"1.0\"?><Xdmf><Domain><Grid><Topology TopologyType=\"{kind}\" \
+             NumberOfElements=\"1\"><DataItem Format=\"XML\" NumberType=\"Int\" \
+             Dimensions=\"1 {nodes}\">{}</DataItem></Topology><Geometry GeometryType=\"XYZ\">\
+             <DataItem Format=\"XML\" Dimensions=\"{nodes} 3\">{}</DataItem></Geometry></Grid>\
+             </Domain></Xdmf>",
+            ids.join(" "),
+            points.join(" ")
+        );
+        let path = dir.path().join(format!("{kind}.xmf"));
+        std::fs::write(&path, text).unwrap();
+        let opened = open(&path).unwrap_or_else(|e| panic!("{e}"));
+        let Dataset::UnstructuredGrid(grid) = opened.dataset().unwrap() else { panic!("{kind}") };
+        expected += &format!("{} {:?}\n", grid.types[0], grid.cells.get(0));
+        paths.push(path.display().to_string());
+    }
+    let script = r"
+import sys, vtk
+for path in sys.argv[1:]:
+    reader = vtk.vtkXdmfReader()
+    reader.SetFileName(path)
+    reader.Update()
+    data = reader.GetOutputDataObject(0)
+    while data.IsA('vtkCompositeDataSet'):
+        data = data.GetBlock(0)
+    cell = data.GetCell(0)
+    print(data.GetCellType(0), [cell.GetPointId(i) for i in range(cell.GetNumberOfPoints())])
+";
+    let paths: Vec<&str> = paths.iter().map(String::as_str).collect();
+    assert_eq!(peer::run(&python, script, &paths), expected);
+}

@@ -5,7 +5,7 @@ mod sample_files;
 
 use datasets::read::{Content, LoadedFile, ReadError, open};
 use proptest::prelude::*;
-use sample_files::openfoam::{Form, case, decomposed, write};
+use sample_files::openfoam::{Form, case, collated, decomposed, write};
 use sample_files::{amrex, ensight};
 use std::path::Path;
 
@@ -207,10 +207,14 @@ proptest! {
     fn every_damage_to_an_openfoam_case_is_survived(
         form in prop::sample::select(vec![Form::Text, Form::Binary, Form::Zipped]),
         across in prop::sample::select(vec!["patch", "empty", "wedge"]),
-        in_parts in any::<bool>(),
+        parts in 0usize..4,
         damages in prop::collection::vec((any::<prop::sample::Index>(), damage()), 1..4),
     ) {
-        let mut files = if in_parts { decomposed(form) } else { case(form, across) };
+        let mut files = match parts {
+            0 => case(form, across),
+            1 => decomposed(form),
+            group => collated(form, group - 1),
+        };
         let count = files.len();
         damages.iter().for_each(|(file, d)| apply(&mut files[file.index(count)].1, d));
         let dir = tempfile::tempdir().unwrap();
@@ -394,7 +398,7 @@ fn deep_nesting_does_not_overflow_the_stack() {
 fn unknown_and_missing_files_are_named() {
     refused("a.h5", b"\x89HDF\r\n\x1a\n....", &["HDF5", "at byte 8", "version 46"]);
     let other = include_bytes!("files/old.h5");
-    refused("a.h5", other, &["neither VTKHDF nor NetCDF-4", "PLOT3D"]);
+    refused("a.h5", other, &["neither VTKHDF, NetCDF-4 nor CGNS", "PLOT3D"]);
     refused("empty.dat", b"", &["the file is empty"]);
     let e = open(Path::new("no/such/file.vti")).unwrap_err().to_string();
     assert!(e.contains("no/such/file.vti") && e.contains("check the name"), "{e}");

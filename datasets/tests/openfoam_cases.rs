@@ -7,7 +7,7 @@ use datasets::model::{Dataset, UnstructuredGrid, WALL_POINTS};
 use datasets::read::openfoam::BOUNDARY_PATCHES;
 use datasets::read::{LoadedFile, OpenOptions, open, open_with};
 use datasets::resample::{Mesh, Plane};
-use sample_files::openfoam::{CaseFile, Form, case, decomposed, write};
+use sample_files::openfoam::{CaseFile, Form, case, collated, decomposed, write};
 
 fn grid(file: &LoadedFile) -> &UnstructuredGrid {
     match file.dataset().unwrap() {
@@ -76,6 +76,61 @@ fn a_decomposed_case_is_one_mesh_without_a_seam() {
         let (surface, _) = joined.dataset().unwrap().to_trimesh(None).unwrap();
         assert_eq!(surface.num_triangles(), 28);
     }
+}
+
+#[test]
+fn a_collated_case_is_the_decomposed_one() {
+    for form in [Form::Text, Form::Binary, Form::Zipped] {
+        let inner = if form == Form::Zipped { Form::Text } else { form };
+        let parts = read(&decomposed(inner));
+        for group in [1, 2] {
+            let joined = read(&collated(form, group));
+            assert_eq!(grid(&joined), grid(&parts), "{form:?}, {group} parts in a folder");
+            assert_eq!(joined.warnings, parts.warnings);
+            let times: Vec<f64> = joined.time_steps.iter().map(|s| s.time).collect();
+            assert_eq!(times, [0.0, 0.25]);
+        }
+    }
+}
+
+#[test]
+fn faults_of_a_collated_case_name_the_part() {
+    let replaced = |name: &str, from: &str, to: &str| {
+        let mut files = collated(Form::Text, 2);
+        let file = files.iter_mut().find(|f| f.0 == name).unwrap();
+        let text = String::from_utf8(file.1.clone()).unwrap();
+        assert!(text.contains(from), "{text}");
+        file.1 = text.replace(from, to).into_bytes();
+        let dir = tempfile::tempdir().unwrap();
+        write(dir.path(), &files);
+        open(dir.path()).map(|_| ()).unwrap_err().to_string()
+    };
+    for (name, from, to, words) in [
+        ("processors2/0.25/T", "\n312", "\nwar", ["`war", "in the block of part 1"]),
+        (
+            "processors2/0.25/T",
+            "Processor1\n\n",
+            "Processor1\n\n9",
+            ["bytes of a block", "truncated"],
+        ),
+        (
+            "processors2/constant/polyMesh/owner",
+            "decomposedBlockData",
+            "labelList",
+            ["it is a labelList, in a folder", "-fileHandler collated"],
+        ),
+    ] {
+        let error = replaced(name, from, to);
+        words.iter().for_each(|w| assert!(error.contains(w), "`{w}` is not in: {error}"));
+    }
+    // A folder of half of the parts.
+    let mut files = collated(Form::Text, 1);
+    files.retain(|f| !f.0.starts_with("processors2_1-1"));
+    files.push(("system/controlDict".into(), CONTROL.into()));
+    let dir = tempfile::tempdir().unwrap();
+    write(dir.path(), &files);
+    let error = open(dir.path()).map(|_| ()).unwrap_err().to_string();
+    assert!(error.contains("no folders processorsN that hold all parts"), "{error}");
 }
 
 #[test]

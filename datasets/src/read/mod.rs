@@ -6,6 +6,7 @@
 
 mod amrex;
 pub(crate) mod base64;
+pub(crate) mod cgns;
 pub mod csv;
 pub mod csv_lattice;
 mod ensight;
@@ -32,6 +33,7 @@ pub(crate) mod volume;
 pub mod vtk_legacy;
 pub mod vtk_xml;
 pub(crate) mod vtkhdf;
+pub(crate) mod wedge;
 pub(crate) mod xdmf;
 
 pub use error::{At, ReadError};

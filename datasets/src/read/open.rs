@@ -2,8 +2,8 @@
 
 use super::error::{Fault, io_error, read_bytes};
 use super::{
-    LoadedFile, OpenOptions, ReadError, amrex, ensight, gltf, hdf5, mhd, netcdf, npy, nrrd, obj,
-    openfoam, plot3d, ply, raw, stl, tecplot, time_axis, vtk_legacy, vtk_xml, vtkhdf, xdmf,
+    LoadedFile, OpenOptions, ReadError, amrex, cgns, ensight, gltf, hdf5, mhd, netcdf, npy, nrrd,
+    obj, openfoam, plot3d, ply, raw, stl, tecplot, time_axis, vtk_legacy, vtk_xml, vtkhdf, xdmf,
 };
 use std::io::Read;
 use std::path::Path;
@@ -11,7 +11,7 @@ use std::path::Path;
 /// The supported formats, for messages.
 pub const KNOWN: &str = "VTK XML (.vti .vtp .vtu .vtr .vts, their parallel forms, .pvd, .vtm, .series), VTK \
                          legacy (.vtk), VTKHDF (.vtkhdf), NetCDF (.nc), Exodus II (.e .exo), \
-                         XDMF (.xdmf .xmf), \
+                         XDMF (.xdmf .xmf), CGNS (.cgns), \
                          PLOT3D (.xyz .x .g .q .bin), NRRD (.nrrd .nhdr), MetaImage (.mhd .mha), \
                          raw with TOML (.raw), NumPy (.npy .npz), OpenFOAM cases (folders, .foam), \
                          Tecplot (.dat .tec .plt), EnSight Gold (.case), \
@@ -39,13 +39,17 @@ enum Format {
     Stl,
     Tecplot,
     EnSight,
+    Cgns,
 }
 
 impl Format {
     /// Whether a file may hold several times.
     fn may_have_times(self) -> bool {
         use Format::*;
-        matches!(self, VtkXml | VtkSeries | VtkHdf | NetCdf | Xdmf | Numpy | Tecplot | EnSight)
+        matches!(
+            self,
+            VtkXml | VtkSeries | VtkHdf | NetCdf | Xdmf | Numpy | Tecplot | EnSight | Cgns
+        )
     }
 
     /// Its name, for messages.
@@ -68,6 +72,7 @@ impl Format {
             Format::Stl => stl::FORMAT,
             Format::Tecplot => tecplot::FORMAT,
             Format::EnSight => ensight::FORMAT,
+            Format::Cgns => cgns::FORMAT,
         }
     }
 }
@@ -154,6 +159,7 @@ pub fn open_with(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Loaded
         Format::Stl => stl::read(path),
         Format::Tecplot => tecplot::read(path, options),
         Format::EnSight => ensight::read(path, options),
+        Format::Cgns => cgns::read(path, options),
     }?;
     // `.g` is PLOT3D's and Exodus II's.
     if let (Some(content), Some(name)) = (by_content, by_name)
@@ -178,6 +184,8 @@ fn from_content(head: &[u8], length: u64) -> Option<Format> {
         Some(Format::VtkSeries)
     } else if head.starts_with(b"CDF") && head.get(3).is_some_and(|v| [1, 2, 5].contains(v)) {
         Some(Format::NetCdf)
+    } else if cgns::begins_as_adf(head) {
+        Some(Format::Cgns)
     } else if head.starts_with(npy::MAGIC) {
         Some(Format::Numpy)
     } else if tecplot::begins_as_tecplot(text) {
@@ -203,10 +211,11 @@ fn from_content(head: &[u8], length: u64) -> Option<Format> {
 /// What an HDF5 file holds, by the names in it.
 fn from_hdf5(path: &Path) -> Result<Format, ReadError> {
     let file = hdf5::Hdf5File::open(path, hdf5::FORMAT)?;
-    let mut is_cgns = false;
-    let mut of_names = || {
+    let of_names = || {
         let names = file.root()?.names()?;
-        is_cgns = names.iter().any(|n| n == "CGNSLibraryVersion");
+        if names.iter().any(|n| n == cgns::VERSION_NODE) {
+            return Ok(Some(Format::Cgns));
+        }
         if names.iter().any(|n| n == vtkhdf::ROOT) {
             return Ok(Some(Format::VtkHdf));
         }
@@ -214,13 +223,8 @@ fn from_hdf5(path: &Path) -> Result<Format, ReadError> {
     };
     let found = of_names().map_err(|f: Fault| f.in_file(path, hdf5::FORMAT))?;
     found.ok_or_else(|| {
-        let what = match is_cgns {
-            true => "a CGNS file: open it in ParaView and save it as .vtu or .vtm",
-            false => {
-                "an HDF5 file that is neither VTKHDF nor NetCDF-4: describe it with an .xdmf file, \
-                 or save it as .vtu with ParaView"
-            }
-        };
+        let what = "an HDF5 file that is neither VTKHDF, NetCDF-4 nor CGNS: describe it with an \
+                    .xdmf file, or save it as .vtu with ParaView";
         ReadError::UnknownFormat { path: path.to_path_buf(), what: what.into(), known: KNOWN }
     })
 }
@@ -252,6 +256,7 @@ fn from_name(path: &Path) -> Option<Format> {
         "stl" => Format::Stl,
         "tec" | "plt" => Format::Tecplot,
         "case" | "encas" => Format::EnSight,
+        "cgns" => Format::Cgns,
         _ => return None,
     })
 }

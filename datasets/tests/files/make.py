@@ -144,7 +144,142 @@ def exodus(name, form):
         v[0], v[1] = [7.0], [8.0]
 
 
+class Cgns:
+    """A CGNS file, as the library maps it to HDF5: a group with name, label and type for each
+    node, and its values in the dataset ` data`."""
+
+    TYPES = {"i4": "I4", "i8": "I8", "f4": "R4", "f8": "R8", "i1": "C1"}
+
+    def __init__(self, name):
+        # The library writes groups with an order, attributes of 33 characters, and HDF5 of 1.8.
+        self.file = h5py.File(name, "w", libver=("v108", "v108"), track_order=True)
+        self.node("CGNSLibraryVersion", "CGNSLibraryVersion_t", np.array([4.4], "f4"))
+
+    def node(self, path, label, values=None):
+        g = self.file.create_group(path, track_order=True)
+        if isinstance(values, str):
+            values = np.frombuffer(values.encode(), "i1")
+        kind = "MT" if values is None else self.TYPES[values.dtype.str[1:]]
+        self.attributes(g, path, label, kind)
+        if values is not None:
+            g[" data"] = values
+
+    def attributes(self, g, path, label, kind):
+        g.attrs["name"] = np.array(path.split("/")[-1].encode(), "S33")
+        g.attrs["label"] = np.array(label.encode(), "S33")
+        g.attrs["type"] = np.array(kind.encode(), "S3")
+
+    def link(self, path, to, file=""):
+        g = self.file.create_group(path, track_order=True)
+        self.attributes(g, path, "", "LK")
+        g[" path"] = np.frombuffer(to.encode() + b"\0", "i1")
+        if file:
+            g[" file"] = np.frombuffer(file.encode() + b"\0", "i1")
+        g[" link"] = h5py.ExternalLink(file, to) if file else h5py.SoftLink(to)
+
+    def names(self, path, label, names):
+        """Names of 32 characters each."""
+        text = "".join(n.ljust(32) for n in names).encode()
+        self.node(path, label, np.frombuffer(text, "i1").reshape(len(names), 32))
+
+    def zone(self, path, sizes, points, kind="Structured", dtype="f8"):
+        self.node(path, "Zone_t", np.array(sizes, "i4"))
+        self.node(f"{path}/ZoneType", "ZoneType_t", kind)
+        self.node(f"{path}/GridCoordinates", "GridCoordinates_t")
+        for axis, x in zip("XYZ", points):
+            self.node(f"{path}/GridCoordinates/Coordinate{axis}", "DataArray_t", x.astype(dtype))
+
+    def section(self, path, kind, elements, first, **arrays):
+        """A section whose elements are numbered from `first`."""
+        self.node(path, "Elements_t", np.array([kind, 0], "i4"))
+        count = len(arrays.get("ElementStartOffset", range(len(elements) + 1))) - 1
+        count = arrays.pop("count", count)
+        self.node(f"{path}/ElementRange", "IndexRange_t",
+                  np.array([first, first + count - 1], "i4"))
+        flat = np.concatenate([np.ravel(e) for e in elements]).astype("i4")
+        self.node(f"{path}/ElementConnectivity", "DataArray_t", flat)
+        for name, values in arrays.items():
+            self.node(f"{path}/{name}", "DataArray_t", np.array(values, "i4"))
+
+
+def cgns_zones(name):
+    """Two structured zones with rind planes, units and two times."""
+    f = Cgns(name)
+    f.node("Base", "CGNSBase_t", np.array([3, 3], "i4"))
+    f.node("Base/DataClass", "DataClass_t", "Dimensional")
+    f.names("Base/DimensionalUnits", "DimensionalUnits_t",
+            ["Gram", "Centimeter", "Second", "Celsius", "Radian"])
+    f.node("Base/Times", "BaseIterativeData_t", np.array([2], "i4"))
+    f.node("Base/Times/TimeValues", "DataArray_t", np.array([0.25, 0.5]))
+    for zone, shift in (("left", 0), ("right", 3)):
+        path = f"Base/{zone}"
+        z, y, x = np.mgrid[0:2, 0:3, 0:4] * 1.0
+        f.zone(path, [[4, 3, 2], [3, 2, 1], [0, 0, 0]], [x + shift, y, z], dtype="f4")
+        for step in range(2):
+            # A plane before i and two behind j have values that do not belong to the zone.
+            p = np.full((1, 4, 4), -1.0)
+            p[:, :2, 1:] = counted((1, 2, 3)) + 100 * step
+            solution = f"{path}/Solution{step}"
+            f.node(solution, "FlowSolution_t")
+            f.node(f"{solution}/GridLocation", "GridLocation_t", "CellCenter")
+            f.node(f"{solution}/Rind", "Rind_t", np.array([1, 0, 0, 2, 0, 0], "i4"))
+            f.node(f"{solution}/Pressure", "DataArray_t", p)
+        f.node(f"{path}/AtVertices", "FlowSolution_t")
+        f.node(f"{path}/AtVertices/Temperature", "DataArray_t", counted((2, 3, 4), "f4"))
+        f.node(f"{path}/Steps", "ZoneIterativeData_t")
+        f.names(f"{path}/Steps/FlowSolutionPointers", "DataArray_t", ["Solution0", "Solution1"])
+
+
+CUBE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1],
+                 [0, 1, 1]], "f8")
+
+
+def cgns_elements(name):
+    """Zones of elements: several kinds with a boundary, cubic ones, and polyhedra."""
+    f = Cgns(name)
+    f.node("Base", "CGNSBase_t", np.array([3, 3], "i4"))
+    # A hexahedron, a wedge and a pyramid, mixed; a tetrahedron; a quad of the boundary.
+    points = np.vstack([CUBE, [[2, 0, 0], [2, 0, 1], [0.5, 2, 0.5], [3, 0, 0], [2, 1, 0]]])
+    f.zone("Base/mixed", [[13], [4], [0]], points.T, "Unstructured")
+    mixed = [[17, 1, 2, 3, 4, 5, 6, 7, 8], [14, 2, 9, 3, 6, 10, 7], [12, 3, 4, 8, 7, 11]]
+    f.section("Base/mixed/Solids", 20, mixed, 1, ElementStartOffset=[0, 9, 16, 22])
+    f.section("Base/mixed/Wall", 7, [[1, 2, 6, 5]], 4)
+    f.section("Base/mixed/Tetra", 10, [[9, 12, 13, 10]], 5)
+    f.node("Base/mixed/Flow", "FlowSolution_t")
+    f.node("Base/mixed/Flow/GridLocation", "GridLocation_t", "CellCenter")
+    f.node("Base/mixed/Flow/Density", "DataArray_t", counted((4,)))
+    # A quadratic and a cubic hexahedron at the same corners, beside each other.
+    middles = [(CUBE[a] + CUBE[b]) / 2 for a, b in
+               [(0, 1), (1, 2), (2, 3), (3, 0), (0, 4), (1, 5), (2, 6), (3, 7), (4, 5), (5, 6),
+                (6, 7), (7, 4)]]
+    points = np.vstack([CUBE, middles, CUBE + [2, 0, 0], np.tile(CUBE[:1], (24, 1))])
+    f.zone("Base/curved", [[52], [2], [0]], points.T, "Unstructured")
+    f.section("Base/curved/Quadratic", 18, [range(1, 21)], 1)
+    f.section("Base/curved/Cubic", 37, [range(21, 53)], 2)
+    # A cube, and a cube of which an edge of the top is cut into two: by faces.
+    points = np.vstack([CUBE, CUBE[[1, 2, 5, 6]] + [1, 0, 0], [[2, 0.5, 1]]])
+    f.zone("Base/polyhedra", [[13], [2], [0]], points.T, "Unstructured")
+    faces = [[2, 3, 7, 6], [1, 5, 8, 4], [1, 2, 6, 5], [4, 8, 7, 3], [1, 4, 3, 2], [5, 6, 7, 8],
+             [9, 10, 12, 13, 11], [2, 9, 11, 6], [3, 7, 12, 10], [2, 3, 10, 9],
+             [6, 11, 13, 12, 7]]
+    starts = np.cumsum([0] + [len(x) for x in faces])
+    f.section("Base/polyhedra/Faces", 22, faces, 1, ElementStartOffset=starts)
+    f.section("Base/polyhedra/Cells", 23, [[1, 2, 3, 4, 5, 6], [-1, 7, 8, 9, 10, 11]], 12,
+              ElementStartOffset=[0, 6, 12])
+
+
+def cgns_links(name):
+    """A zone that is that of another file, under another name, and a link within the file."""
+    f = Cgns(name)
+    f.node("Base", "CGNSBase_t", np.array([3, 3], "i4"))
+    f.link("Base/linked", "/Base/mixed", "elements.cgns")
+    f.link("Base/again", "/Base/linked")
+
+
 if __name__ == "__main__":
+    cgns_zones("zones.cgns")
+    cgns_elements("elements.cgns")
+    cgns_links("links.cgns")
     exodus("offset.exo", "NETCDF3_64BIT_OFFSET")
     exodus("netcdf4.exo", "NETCDF4")
     image("image.vtkhdf", [])

@@ -447,6 +447,8 @@ pub(crate) fn all() -> Vec<Sample> {
         ("a.glb", glb()),
         ("a.vtkhdf", include_bytes!("../files/image.vtkhdf").to_vec()),
         ("b.vtkhdf", include_bytes!("../files/times.vtkhdf").to_vec()),
+        ("a.cgns", include_bytes!("../files/zones.cgns").to_vec()),
+        ("b.cgns", include_bytes!("../files/elements.cgns").to_vec()),
         ("a.nc", include_bytes!("../files/classic.nc").to_vec()),
         ("b.nc", include_bytes!("../files/data.nc").to_vec()),
         ("a.exo", include_bytes!("../files/offset.exo").to_vec()),

@@ -194,6 +194,50 @@ pub(crate) fn decomposed(form: Form) -> Vec<CaseFile> {
     files
 }
 
+/// The same parts in the collated format, in folders that hold `group` of them each: one file for
+/// all, whose blocks but the first have no header.
+pub(crate) fn collated(form: Form, group: usize) -> Vec<CaseFile> {
+    let inner = if form == Form::Zipped { Form::Text } else { form };
+    let parts = decomposed(inner);
+    let count = 2;
+    let mut files: Vec<CaseFile> = Vec::new();
+    for (name, bytes) in &parts {
+        let (processor, rest) = name.split_once('/').unwrap();
+        let rank: usize = processor.trim_start_matches("processor").parse().unwrap();
+        let first = rank / group * group;
+        let folder = match group {
+            _ if group >= count => format!("processors{count}"),
+            _ => format!("processors{count}_{first}-{}", first + group - 1),
+        };
+        let path = format!("{folder}/{rest}");
+        let block = match rank - first {
+            0 => bytes.clone(),
+            _ => {
+                let end = b"// * * //\n";
+                let at = bytes.windows(end.len()).position(|w| w == end).unwrap();
+                bytes[at + end.len()..].to_vec()
+            }
+        };
+        let mut text = format!("\n\n// Processor{rank}\n\n{}\n(", block.len()).into_bytes();
+        text.extend(block);
+        text.extend(b")\n");
+        match files.iter_mut().find(|f| f.0 == path) {
+            Some(file) => file.1.extend(text),
+            None => {
+                let head = header(Form::Binary, "decomposedBlockData", "x").into_bytes();
+                files.push((path, [head, text].concat()));
+            }
+        }
+    }
+    if form == Form::Zipped {
+        for (name, bytes) in &mut files {
+            *name += ".gz";
+            *bytes = super::gzip(bytes);
+        }
+    }
+    files
+}
+
 /// Writes the files of a case.
 pub(crate) fn write(folder: &Path, files: &[CaseFile]) {
     for (name, bytes) in files {

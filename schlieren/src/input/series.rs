@@ -14,8 +14,8 @@ pub struct Step {
 }
 
 /// Lists the times of a series: those of a single PVD file, file series (`.vtu.series`),
-/// OpenFOAM or EnSight case, or VTKHDF, NetCDF, XDMF, Exodus or Tecplot file, or one per file in
-/// the given order.
+/// OpenFOAM or EnSight case, or VTKHDF, NetCDF, XDMF, Exodus, CGNS or Tecplot file, or one per
+/// file in the given order.
 ///
 /// Comparing them requires the same reference: load the first, then pass its
 /// [`super::Report::reference_n_minus_1`] as [`super::Reference::Given`] to the others.
@@ -53,7 +53,7 @@ pub fn series(paths: &[PathBuf]) -> Result<Vec<Step>, InputError> {
 fn has_times(path: &Path) -> bool {
     let lists = [
         "pvd", "series", "vtkhdf", "hdf", "nc", "nc4", "cdf", "xdmf", "xmf", "e", "exo", "case",
-        "tec", "plt",
+        "tec", "plt", "cgns",
     ];
     path.extension().is_some_and(|e| lists.iter().any(|l| e.eq_ignore_ascii_case(l)))
         || datasets::read::openfoam::is_whole_case(path)

@@ -5,12 +5,14 @@
 //!
 //! Source: AMReX User's Guide, "I/O", and what `WriteMultiLevelPlotfile` and `FABio` write.
 
+mod box_tree;
 mod fab;
 mod header;
 
 use super::error::{At, BROKEN, Fault, read_bytes};
 use super::{Content, LoadedFile, OpenOptions, ReadError};
 use crate::model::{Attributes, Block, DataArray, Dataset, ImageData, Values, extent_dims};
+use box_tree::BoxTree;
 use glam::DVec3;
 use header::{Header, IndexBox, boxes_of_level};
 use std::path::{Path, PathBuf};
@@ -50,6 +52,10 @@ pub(crate) fn read(path: &Path, options: &OpenOptions) -> Result<LoadedFile, Rea
     }
     let mut blocks = Vec::new();
     for (l, (list, boxes)) in levels.iter().enumerate() {
+        let finer = levels.get(l + 1).map(|(_, finer)| {
+            let ratio = h.levels[l].ratio;
+            BoxTree::new(finer.iter().map(|f| f.cells.coarsened(ratio)))
+        });
         // Boxes of ranks take turns in the list, and each rank has a file: file by file, each is
         // read once.
         let mut by_file: Vec<usize> = (0..boxes.len()).collect();
@@ -67,9 +73,8 @@ pub(crate) fn read(path: &Path, options: &OpenOptions) -> Result<LoadedFile, Rea
             let columns =
                 fab::read(bytes, b.offset, &b.cells, h.variables.len(), h.axes).map_err(in_file)?;
             let mut data = image(&h, l, &b.cells, columns).map_err(in_file)?;
-            if let Some((_, finer)) = levels.get(l + 1) {
-                let ratio = h.levels[l].ratio;
-                mark(&mut data, &b.cells, finer.iter().map(|f| f.cells.coarsened(ratio)));
+            if let Some(finer) = &finer {
+                mark(&mut data, &b.cells, finer);
             }
             let data = Dataset::ImageData(data);
             data.check().map_err(|e| in_file(e.into()))?;
@@ -125,11 +130,10 @@ fn image(
 }
 
 /// Marks the cells that boxes of the finer level cover.
-fn mark(data: &mut ImageData, cells: &IndexBox, finer: impl Iterator<Item = IndexBox>) {
+fn mark(data: &mut ImageData, cells: &IndexBox, finer: &BoxTree) {
     let dims = extent_dims(data.extent).map(|d| d.saturating_sub(1).max(1));
     let mut ghosts = vec![0u8; dims.iter().product()];
-    for f in finer {
-        let Some(both) = cells.intersection(&f) else { continue };
+    finer.visit(cells, &mut |both| {
         let from = |a: usize| (both.low[a] - cells.low[a]) as usize;
         let to = |a: usize| (both.high[a] - cells.low[a]) as usize;
         for k in from(2)..=to(2) {
@@ -138,7 +142,7 @@ fn mark(data: &mut ImageData, cells: &IndexBox, finer: impl Iterator<Item = Inde
                 ghosts[row + from(0)..=row + to(0)].fill(REFINED);
             }
         }
-    }
+    });
     if ghosts.contains(&REFINED) {
         data.attributes.cell.push(DataArray::new("vtkGhostType", 1, Values::U8(ghosts)));
     }

@@ -7,6 +7,7 @@ use crate::model::{
     UnstructuredGrid, Values, extent_dims,
 };
 use crate::read::error::{At, BROKEN, Fault};
+use crate::read::wedge::{TURNED, is_turned};
 use glam::DVec3;
 
 /// A part, and how many elements of each type it has, in the order of the file.
@@ -41,16 +42,6 @@ fn element(name: &str) -> Option<(u8, usize)> {
 
 const WEDGE: u8 = 13;
 const QUADRATIC_WEDGE: u8 = 26;
-/// The corners of a wedge and of a quadratic one with the triangles turned.
-const TURNED: [usize; 15] = [0, 2, 1, 3, 5, 4, 8, 7, 6, 11, 10, 9, 12, 14, 13];
-
-/// Whether the first triangle of a wedge is seen from inside, as in EnSight's manual; in VTK it is
-/// seen from outside. Programs write both, so the points decide.
-fn is_turned(e: &[u32], points: &Points) -> bool {
-    let at = |k: usize| points.get(e[k] as usize);
-    (at(1) - at(0)).cross(at(2) - at(0)).dot(at(3) - at(0)) > 0.0
-}
-
 const POLYGON: u8 = 7;
 const POLYHEDRON: u8 = 42;
 

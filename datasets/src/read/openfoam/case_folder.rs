@@ -1,20 +1,29 @@
 //! The folders of a case: where its mesh and its times are.
 
-use super::text::{FORMAT, exists};
+use super::collated::{BlockCache, Group};
+use super::text::{FORMAT, FoamFile, exists};
 use crate::read::error::{At, Fault, io_error};
 use crate::read::{ReadError, TimeStep};
 use std::path::{Path, PathBuf};
 
-/// A case on disk.
+/// Where a part of a mesh is.
 #[derive(Debug, Clone, PartialEq)]
+pub(super) struct Part {
+    pub(super) folder: PathBuf,
+    /// The number of its block, in files that hold those of several parts.
+    block: Option<usize>,
+}
+
+/// A case on disk.
 pub(super) struct CaseFolder {
     pub(super) root: PathBuf,
-    /// The folders with parts of the mesh: the root itself, or `processor0` and so on.
-    pub(super) parts: Vec<PathBuf>,
+    /// The parts of the mesh: the root itself, or those of `processor0` and so on.
+    pub(super) parts: Vec<Part>,
     /// Times in order, with the names of their folders.
     pub(super) times: Vec<(f64, String)>,
     /// What was chosen among several possibilities.
     pub(super) warnings: Vec<String>,
+    blocks: BlockCache,
 }
 
 /// The case that a path means, and the name of the time if the path is that of one. `None` if it is
@@ -36,9 +45,11 @@ pub(super) fn locate(path: &Path) -> Option<(PathBuf, Option<String>)> {
 
 fn is_case(folder: &Path) -> bool {
     let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    let is_collated = || entries(folder).is_ok_and(|n| Group::all(folder, &n).is_some());
     has_mesh(folder)
         || has_mesh(&folder.join("processor0"))
         || folder.join("system/controlDict").is_file()
+        || folder.is_dir() && is_collated()
 }
 
 fn has_mesh(folder: &Path) -> bool {
@@ -57,29 +68,34 @@ impl CaseFolder {
         let mut warnings = Vec::new();
         let mut parts = Vec::new();
         while has_mesh(&root.join(format!("processor{}", parts.len()))) {
-            parts.push(root.join(format!("processor{}", parts.len())));
+            let folder = root.join(format!("processor{}", parts.len()));
+            parts.push(Part { folder, block: None });
+        }
+        let mut folders: Vec<PathBuf> =
+            parts.first().map(|p| p.folder.clone()).into_iter().collect();
+        let groups = Group::all(root, &entries(root)?).filter(|_| parts.is_empty());
+        for group in groups.into_iter().flatten() {
+            let folder = root.join(&group.name);
+            let part = |block| Part { folder: folder.clone(), block: Some(block) };
+            parts.extend((0..group.parts.len()).map(part));
+            folders.push(folder);
         }
         let whole = has_mesh(root);
         let own_times = times_in(root)?;
-        let times_of_parts = match parts.first() {
+        let mut times_of_parts = match folders.first() {
             Some(first) => times_in(first)?,
             None => Vec::new(),
         };
+        for other in folders.iter().skip(1) {
+            let times = times_in(other)?;
+            times_of_parts.retain(|t| times.contains(t));
+        }
         let last = |times: &[(f64, String)]| times.last().map_or(f64::NEG_INFINITY, |t| t.0);
         if !whole && parts.is_empty() {
-            let collated = entries(root)?.into_iter().any(|e| {
-                e.strip_prefix("processors")
-                    .is_some_and(|n| n.starts_with(|c: char| c.is_ascii_digit()))
-            });
-            let (what, cure) = if collated {
-                ("the case is decomposed in the collated format", "run reconstructPar first")
-            } else {
-                (
-                    "there is neither constant/polyMesh nor processor0/constant/polyMesh",
-                    "run blockMesh or the mesher of the case; of a case with several regions, \
-                     convert one with foamToVTK -region",
-                )
-            };
+            let what = "there is neither constant/polyMesh nor processor0/constant/polyMesh, and \
+                        no folders processorsN that hold all parts";
+            let cure = "run blockMesh or the mesher of the case; of a case with several regions, \
+                        convert one with foamToVTK -region";
             let fault = Fault::unsupported(At::Field("the case".into()), what, cure);
             return Err(fault.in_file(root, FORMAT));
         }
@@ -93,9 +109,10 @@ impl CaseFolder {
         }
         let times = if decomposed { times_of_parts } else { own_times };
         if !decomposed {
-            parts = vec![root.to_path_buf()];
+            parts = vec![Part { folder: root.to_path_buf(), block: None }];
         }
-        Ok(CaseFolder { root: root.to_path_buf(), parts, times, warnings })
+        let (root, blocks) = (root.to_path_buf(), BlockCache::default());
+        Ok(CaseFolder { root, parts, times, warnings, blocks })
     }
 
     /// The times as steps of a series; each path opens the case at its time.
@@ -110,15 +127,28 @@ impl CaseFolder {
 
     /// The file of the mesh of `part` that holds at the time of index `time`: meshes that move or
     /// change are written with the times.
-    pub(super) fn mesh_file(&self, part: &Path, name: &str, time: Option<usize>) -> PathBuf {
+    pub(super) fn mesh_file(
+        &self,
+        part: &Part,
+        name: &str,
+        time: Option<usize>,
+    ) -> Result<FoamFile, ReadError> {
         let earlier = time.map_or(&[][..], |t| &self.times[..=t]);
         for (_, folder) in earlier.iter().rev() {
-            let file = part.join(folder).join("polyMesh").join(name);
+            let file = part.folder.join(folder).join("polyMesh").join(name);
             if exists(&file) {
-                return file;
+                return self.open_file(part, &file);
             }
         }
-        part.join("constant/polyMesh").join(name)
+        self.open_file(part, &part.folder.join("constant/polyMesh").join(name))
+    }
+
+    /// A file of a part, whole or the part's block of it.
+    pub(super) fn open_file(&self, part: &Part, path: &Path) -> Result<FoamFile, ReadError> {
+        match part.block {
+            None => FoamFile::open(path, None),
+            Some(block) => self.blocks.open(path)?.part(block),
+        }
     }
 }
 

@@ -1,11 +1,11 @@
 //! The fields of a time: one file each, values of the cells.
 
-use super::case_folder::{CaseFolder, files_in};
+use super::case_folder::{CaseFolder, Part, files_in};
+use super::collated::open_first;
 use super::text::{FORMAT, FoamFile};
 use crate::model::{DataArray, ScalarType, Values};
 use crate::read::ReadError;
 use crate::read::error::{At, Fault};
-use std::path::Path;
 
 /// Bytes of a file that hold its header: it begins with a banner of about 900.
 const HEAD_BYTES: u64 = 8192;
@@ -32,7 +32,7 @@ pub(super) fn fields(
     warnings: &mut Vec<String>,
 ) -> Result<Vec<DataArray>, ReadError> {
     let folder = &case.times[time].1;
-    let first = case.parts[0].join(folder);
+    let first = case.parts[0].folder.join(folder);
     let (files, folders) = files_in(&first)?;
     if folders.iter().any(|f| f == "lagrangian") {
         warnings.push("the particles in `lagrangian` are left out".into());
@@ -40,7 +40,7 @@ pub(super) fn fields(
     let mut others: Vec<String> = Vec::new();
     let mut arrays = Vec::new();
     for name in files {
-        let Ok(head) = FoamFile::open(&first.join(&name), Some(HEAD_BYTES)) else {
+        let Ok(head) = open_first(&first.join(&name), HEAD_BYTES) else {
             others.push(format!("{name} (no file of OpenFOAM)"));
             continue;
         };
@@ -50,7 +50,7 @@ pub(super) fn fields(
         };
         let mut joined: Option<Values> = None;
         for (part, &cells) in case.parts.iter().zip(cells_of_parts) {
-            let values = match field(&part.join(folder), &name, components, cells, warnings) {
+            let values = match field(case, part, folder, &name, components, cells, warnings) {
                 Ok(values) => values,
                 Err(ReadError::Unsupported { what, at, .. }) => {
                     warnings.push(format!("field `{name}` left out: {what} ({at})"));
@@ -73,19 +73,21 @@ pub(super) fn fields(
 }
 
 fn field(
-    folder: &Path,
+    case: &CaseFolder,
+    part: &Part,
+    folder: &str,
     name: &str,
     components: usize,
     cells: usize,
     warnings: &mut Vec<String>,
 ) -> Result<Values, ReadError> {
-    let path = folder.join(name);
+    let path = part.folder.join(folder).join(name);
     if !super::text::exists(&path) {
         let cure = "the other parts have it: run reconstructPar, or decompose the case again";
         let fault = Fault::new(At::Field(format!("field `{name}`")), "the file is missing", cure);
         return Err(fault.in_file(&path, FORMAT));
     }
-    let mut file = FoamFile::open(&path, None)?;
+    let mut file = case.open_file(part, &path)?;
     values(&mut file, name, components, cells, warnings).map_err(|e| file.fault(e))
 }
 

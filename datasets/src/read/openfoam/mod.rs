@@ -1,15 +1,16 @@
 //! Cases of OpenFOAM: the folder of a case, a `.foam` file in it, or the folder of one time.
 //!
 //! Files may be text or binary (labels and scalars of 32 or 64 bits), plain or gzipped; the case
-//! may be decomposed (`processor0`, `processor1`, ...), its mesh may move. Fields on cells become
-//! cell arrays. A case that is one cell thick, between patches of type `empty` or `wedge`, becomes
-//! a plane of polygons, which schlieren extrudes or revolves. The patches of the boundary are
-//! listed in the field data `boundary patches`, one text `NAME TYPE FACES` each: a `wall` is a
-//! body, a `patch` is open.
+//! may be decomposed (`processor0`, `processor1`, ..., or collated in `processorsN`), its mesh may
+//! move. Fields on cells become cell arrays. A case that is one cell thick, between patches of type
+//! `empty` or `wedge`, becomes a plane of polygons, which schlieren extrudes or revolves. The
+//! patches of the boundary are listed in the field data `boundary patches`, one text
+//! `NAME TYPE FACES` each: a `wall` is a body, a `patch` is open.
 //!
 //! Source: OpenFOAM User Guide, chapters "Case structure", "Mesh description" and "Boundaries".
 
 mod case_folder;
+mod collated;
 mod fields;
 mod plane;
 mod poly_mesh;

@@ -5,7 +5,6 @@ use crate::model::{Cells, DataArray, Values, WALL_POINTS, is_name_of_body};
 use crate::read::ReadError;
 use crate::read::error::{At, BROKEN, Fault};
 use std::collections::HashMap;
-use std::path::PathBuf;
 
 /// Stands for the missing cell behind a face of the boundary.
 pub(super) const NO_CELL: u32 = u32::MAX;
@@ -59,9 +58,10 @@ impl PolyMesh {
         is_wall
     }
 
-    /// Reads the five files; `file` tells where each is.
-    pub(super) fn read(file: impl Fn(&str) -> PathBuf) -> Result<PolyMesh, ReadError> {
-        let open = |name: &str| FoamFile::open(&file(name), None);
+    /// Reads the five files, which `open` opens.
+    pub(super) fn read(
+        open: impl Fn(&str) -> Result<FoamFile, ReadError>,
+    ) -> Result<PolyMesh, ReadError> {
         let mut f = open("points")?;
         let points = f.tuples(3, None).map_err(|e| f.fault(e))?;
         let points: Vec<[f64; 3]> =

@@ -8,6 +8,7 @@ use crate::model::{Endian, ScalarType, Values};
 use crate::read::ReadError;
 use crate::read::error::{At, BROKEN, Fault, TRUNCATED, fits, io_error};
 use std::io::Read;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 pub(super) const FORMAT: &str = "OpenFOAM";
@@ -16,6 +17,8 @@ pub(super) const FORMAT: &str = "OpenFOAM";
 pub(super) struct FoamFile {
     pub(super) path: PathBuf,
     pub(super) class: String,
+    /// The number of its block, if it is one of several in a file: positions are those within it.
+    block: Option<usize>,
     bytes: Vec<u8>,
     pos: usize,
     binary: bool,
@@ -58,26 +61,71 @@ impl FoamFile {
             let what = format!("it cannot be unpacked: {e}");
             return Err(Fault::new(At::Byte(0), what, TRUNCATED).in_file(&path, FORMAT));
         }
-        let mut file = FoamFile {
-            path,
+        let mut file = FoamFile::of_bytes(&path, None, bytes);
+        file.header().map_err(|f| file.fault(f))?;
+        Ok(file)
+    }
+
+    /// A file, or a block of one, with these bytes; its header is not read.
+    pub(super) fn of_bytes(path: &Path, block: Option<usize>, bytes: Vec<u8>) -> FoamFile {
+        FoamFile {
+            path: path.to_path_buf(),
             class: String::new(),
+            block,
             bytes,
             pos: 0,
             binary: false,
             label_bytes: 4,
             scalar_bytes: 8,
             endian: Endian::Little,
-        };
-        file.header().map_err(|f| file.fault(f))?;
-        Ok(file)
+        }
+    }
+
+    /// With what the header of another file says.
+    pub(super) fn with_header_of(self, other: &FoamFile) -> FoamFile {
+        let &FoamFile { binary, label_bytes, scalar_bytes, endian, .. } = other;
+        let class = other.class.clone();
+        FoamFile { class, binary, label_bytes, scalar_bytes, endian, ..self }
+    }
+
+    /// Whether a header comes next.
+    pub(super) fn begins_with_header(&mut self) -> bool {
+        self.peek();
+        self.bytes[self.pos..].starts_with(b"FoamFile")
+    }
+
+    /// Goes into a list of bytes, whose length stands before it; returns the length.
+    pub(super) fn enter_bytes(&mut self) -> Result<u64, Fault> {
+        let count = self.number("the length of a block")?;
+        self.expect(b'(')?;
+        Ok(count)
+    }
+
+    /// Goes over a list of bytes; returns their place.
+    pub(super) fn skip_bytes(&mut self) -> Result<Range<usize>, Fault> {
+        let count = self.enter_bytes()?;
+        let n = fits(count, 1, self.bytes.len() - self.pos, self.at(), "bytes of a block")?;
+        let range = self.pos..self.pos + n;
+        self.pos = range.end;
+        self.expect(b')')?;
+        Ok(range)
+    }
+
+    /// Bytes at a place that [`Self::skip_bytes`] returned.
+    pub(super) fn bytes_at(&self, range: Range<usize>) -> &[u8] {
+        &self.bytes[range]
     }
 
     /// Adds the name of the file.
-    pub(super) fn fault(&self, fault: Fault) -> ReadError {
+    pub(super) fn fault(&self, mut fault: Fault) -> ReadError {
+        if let Some(block) = self.block {
+            fault.what = format!("{} (in the block of part {block})", fault.what);
+        }
         fault.in_file(&self.path, FORMAT)
     }
 
-    fn header(&mut self) -> Result<(), Fault> {
+    /// Reads the header.
+    pub(super) fn header(&mut self) -> Result<(), Fault> {
         let first = self.word();
         if first.as_deref() != Some("FoamFile") {
             let what = "it does not begin with the dictionary FoamFile";

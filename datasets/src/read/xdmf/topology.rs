@@ -16,7 +16,10 @@ pub(super) enum Lattice {
 }
 
 /// Name, number in mixed topologies, points, VTK's number.
-const CELLS: [(&str, i64, usize, u8); 17] = [
+///
+/// The nodes of quadratic cells are in VTK's order: the Xdmf reader in VTK passes them on as they
+/// are.
+const CELLS: [(&str, i64, usize, u8); 19] = [
     ("triangle", 4, 3, 5),
     ("quadrilateral", 5, 4, 9),
     ("tetrahedron", 6, 4, 10),
@@ -30,7 +33,9 @@ const CELLS: [(&str, i64, usize, u8); 17] = [
     ("tetrahedron_10", 38, 10, 24),
     ("pyramid_13", 39, 13, 27),
     ("wedge_15", 40, 15, 26),
+    ("wedge_18", 41, 18, 32),
     ("hexahedron_20", 48, 20, 25),
+    ("hexahedron_24", 49, 24, 33),
     ("hexahedron_27", 50, 27, 29),
     ("tri_6", 36, 6, 22),
     ("tet_10", 38, 10, 24),
