@@ -134,7 +134,8 @@ impl<'r, L: Copy> Lane<'r, L> {
             prefetch::<3, _>(units, leaf.unit());
         }
         (self.leaves, self.parent) = (leaves, at);
-        let next = push_children::<S, L::Query, false>(units, node, near, hit & !leaves, stack);
+        let next =
+            push_children::<S, L::Query, false>(simd, units, node, near, hit & !leaves, stack);
         self.current = next.unwrap_or_else(
             #[inline(always)]
             || pop_nearer(stack, self.skip_t),
