@@ -36,17 +36,13 @@ impl<'m, T: Copy, const N: usize> Stack<'m, T, N> {
         self.len += 1;
     }
 
-    /// Pushes the values whose bit is set in `which`, without a branch on any bit.
+    /// Pushes the first `n` of the values, at most eight, without a branch on their number.
     #[inline(always)]
-    pub(crate) fn push_some(&mut self, values: [T; 8], which: u32) {
+    pub(crate) fn push_first(&mut self, values: [T; 8], n: usize) {
         let room: &mut [MaybeUninit<T>; 8] =
             self.data[self.len..].first_chunk_mut().expect("room for eight");
-        let mut n = 0;
-        for (i, value) in values.into_iter().enumerate() {
-            room[n & 7].write(value);
-            n += (which >> i & 1) as usize;
-        }
-        self.len += n;
+        *room = values.map(MaybeUninit::new);
+        self.len += n.min(8);
     }
 
     #[inline(always)]

@@ -39,8 +39,9 @@ const IN_TURNS: usize = 4;
 /// A subtree and the rays that hit its box.
 #[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
 struct Entry {
-    /// Distance of one of the rays to the box, for the order of visits. Not used for occlusion.
-    distance: f32,
+    /// For the order of visits, smallest first: the distance of one of the rays to the box. For
+    /// occlusion, minus the number of rays that reach it.
+    order: f32,
     child: u32,
     rays: u16,
 }
@@ -65,7 +66,7 @@ pub(super) fn trace<S: Simd, T: TriangleTest, Q: HitQuery>(
     let mut t = rays.t_max;
     let mut memory = StackMemory::<Entry, STACK_SIZE>::new();
     let mut stack = Stack::empty(&mut memory);
-    stack.push(Entry { distance: 0.0, child: ChildRef::node(0).0, rays: active });
+    stack.push(Entry { order: 0.0, child: ChildRef::node(0).0, rays: active });
     while let Some(Entry { child, rays: met, .. }) = stack.pop() {
         let met = met & active;
         if met == 0 {
@@ -115,14 +116,15 @@ pub(super) fn trace<S: Simd, T: TriangleTest, Q: HitQuery>(
             }
             prefetch::<4, _>(units, ChildRef(refs[slot]).unit());
             // Another ray of `hit` may be nearer than the first one. The order of visits need not
-            // be exact.
-            let distance =
-                if Q::ANY { 0.0 } else { near.as_slice()[hit.trailing_zeros() as usize & 15] };
-            stack.push(Entry { distance, child: refs[slot], rays: hit });
+            // be exact. What is in the way of many rays answers them before they part.
+            let order = if Q::ANY {
+                -(hit.count_ones() as f32)
+            } else {
+                near.as_slice()[hit.trailing_zeros() as usize & 15]
+            };
+            stack.push(Entry { order, child: refs[slot], rays: hit });
         }
-        if !Q::ANY {
-            stack.sort_descending_from(base);
-        }
+        stack.sort_descending_from(base);
     }
 }
 

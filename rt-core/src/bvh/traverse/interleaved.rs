@@ -128,13 +128,15 @@ impl<'r, L: Copy> Lane<'r, L> {
         let refs = node[CHILD_ROW].bits();
         let leaves = hit & leaf_slots(simd, refs);
         // The first two leaves are requested without a branch on their number. Where there is none,
-        // any slot is.
+        // this node is, which is in the cache: what is requested in vain takes the place of what is
+        // not.
         for set in [leaves, leaves & leaves.wrapping_sub(1)] {
             let leaf = ChildRef(refs[set.trailing_zeros() as usize & 7]);
-            prefetch::<3, _>(units, leaf.unit());
+            prefetch::<3, _>(units, if set == 0 { at } else { leaf.unit() });
         }
         (self.leaves, self.parent) = (leaves, at);
-        let next = push_children::<S, L::Query, false>(units, node, near, hit & !leaves, stack);
+        let next =
+            push_children::<S, L::Query, false>(simd, units, node, near, hit & !leaves, stack);
         self.current = next.unwrap_or_else(
             #[inline(always)]
             || pop_nearer(stack, self.skip_t),

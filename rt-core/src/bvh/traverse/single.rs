@@ -9,7 +9,7 @@ use crate::bvh::query::HitQuery;
 use crate::ray::Ray;
 use crate::simd::{Stack, StackMemory, prefetch};
 use crate::stats::{Counter, count};
-use fearless_simd::{Simd, SimdBase, SimdMask, f32x8, u32x8};
+use fearless_simd::{Simd, SimdBase, SimdMask, f32x8, mask32x8, u32x8};
 
 /// Relative widening of a box's far distance, 16 u with u = 2⁻²⁴. With it, the box test never
 /// rejects a box whose triangle the triangle test hits.
@@ -202,7 +202,7 @@ pub(crate) fn traverse_from<S: Simd, L: LeafTest<S>>(
             let refs = node[CHILD_ROW].bits();
             let now = if L::TOGETHER { hit & leaf_slots(simd, refs) } else { 0 };
             let next =
-                push_children::<S, L::Query, true>(units, node, near, hit & !now, &mut stack);
+                push_children::<S, L::Query, true>(simd, units, node, near, hit & !now, &mut stack);
             if now != 0 {
                 count(Counter::Leaves, now.count_ones() as u64);
                 if leaves.test_many(simd, units, refs, now, &mut skip_t) {
@@ -231,18 +231,22 @@ pub(crate) fn traverse_from<S: Simd, L: LeafTest<S>>(
 /// `PREFETCH`, the children are requested from memory; without, the caller does it.
 #[inline(always)]
 pub(super) fn push_children<S: Simd, Q: HitQuery, const PREFETCH: bool>(
+    simd: S,
     units: &[Unit],
     node: &[Unit; NODE_UNITS],
     near: f32x8<S>,
     mut mask: u32,
     stack: &mut Stack<'_, u64, STACK_SIZE>,
 ) -> Option<ChildRef> {
-    if mask == 0 {
-        return None;
-    }
     let refs = node[CHILD_ROW].bits();
     if Q::ANY && !PREFETCH {
-        stack.push_some(refs.map(u64::from), mask);
+        // The children that are hit, without gaps.
+        let hit = mask32x8::from_bitmask(simd, u64::from(mask));
+        let children = u32x8::from_slice(simd, refs).compress(hit).to_array();
+        stack.push_first(children.map(u64::from), mask.count_ones() as usize);
+        return None;
+    }
+    if mask == 0 {
         return None;
     }
     let first = mask.trailing_zeros() as usize;
@@ -296,4 +300,37 @@ pub(super) fn push_children<S: Simd, Q: HitQuery, const PREFETCH: bool>(
     }
     stack.sort_descending_from(base);
     None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bvh::query::AnyHit;
+    use crate::simd::SimdLevel;
+    use fearless_simd::dispatch;
+
+    #[test]
+    fn any_hit_queries_push_the_children_that_are_hit_and_no_others_at_every_level() {
+        let refs = [3, 1 << 31 | 5, 0, 7, 1 << 29, 9, 11, u32::MAX];
+        let mut node = [Unit::ZERO; NODE_UNITS];
+        *node[CHILD_ROW].bits_mut() = refs;
+        for level in SimdLevel::available() {
+            let name = level.name();
+            let level = SimdLevel::resolve(Some(level)).expect("listed as available");
+            for mask in 0..256u32 {
+                let mut memory = StackMemory::new();
+                let mut stack = Stack::empty(&mut memory);
+                stack.push(42);
+                let next = dispatch!(level, simd => {
+                    let near = f32x8::splat(simd, 0.0);
+                    push_children::<_, AnyHit, false>(simd, &[], &node, near, mask, &mut stack)
+                });
+                assert!(next.is_none(), "{name}: {mask:08b}");
+                let hit = (0..WIDTH).filter(|slot| mask >> slot & 1 == 1);
+                let expected = hit.map(|slot| u64::from(refs[slot])).rev().chain([42]);
+                let popped = std::iter::from_fn(|| stack.pop());
+                assert!(popped.eq(expected), "{name}: {mask:08b}");
+            }
+        }
+    }
 }

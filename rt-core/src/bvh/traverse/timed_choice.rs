@@ -16,6 +16,8 @@ struct Trial {
     wait: u32,
     /// Number of trials so far.
     count: u32,
+    /// The last trial took so long that it may have been interrupted.
+    in_doubt: bool,
 }
 
 /// Where the comparison with another way stands. A trial is compared with the mean of the pieces
@@ -53,10 +55,17 @@ impl<const N: usize> TimedChoice<N> {
     /// A trial counts at most this many times the best way's time: an interruption must not rule a
     /// way out for long.
     const MOST: f32 = 8.0;
+    /// A trial that takes more than this many times the best way's time counts only when the next
+    /// one does too. On a machine whose cores are all in use, one interruption in a trial ruled the
+    /// faster way out for thousands of pieces.
+    const DOUBTFUL: f32 = 2.0;
+    /// Pieces before and after a trial that differ by more than this factor are a border in the
+    /// image, or one of them was interrupted. At 4, such pairs let the slower way win.
+    const ALIKE: f32 = 2.0;
 
     /// `best` is taken for the best way at first.
     pub(crate) const fn new(best: usize) -> Self {
-        let trial = Trial { time: 0.0, best_time: 0.0, wait: 2, count: 0 };
+        let trial = Trial { time: 0.0, best_time: 0.0, wait: 2, count: 0, in_doubt: false };
         TimedChoice { best, trials: [trial; N], step: Step::Idle }
     }
 
@@ -88,9 +97,10 @@ impl<const N: usize> TimedChoice<N> {
             Step::Before(k) => Step::Trial(k, seconds),
             Step::Trial(k, before) => Step::After(k, before, seconds),
             Step::After(k, before, time) => {
-                // Neighbours that differ much are a border in the image, or an interruption.
-                if before.max(seconds) <= 4.0 * before.min(seconds) {
+                if before.max(seconds) <= Self::ALIKE * before.min(seconds) {
                     self.compare(k, time, 0.5 * (before + seconds));
+                } else {
+                    self.trials[k].wait = Self::WAIT[0] as u32;
                 }
                 Step::Idle
             }
@@ -100,10 +110,16 @@ impl<const N: usize> TimedChoice<N> {
     /// Learns that way `k` took `time` where the best one took `best_time`.
     fn compare(&mut self, k: usize, time: f32, best_time: f32) {
         let trial = &mut self.trials[k];
+        let [shortest, longest] = Self::WAIT;
+        if time > Self::DOUBTFUL * best_time && !trial.in_doubt {
+            trial.in_doubt = true;
+            trial.wait = shortest as u32;
+            return;
+        }
+        trial.in_doubt = false;
         trial.time = Self::MEMORY * trial.time + time.min(Self::MOST * best_time);
         trial.best_time = Self::MEMORY * trial.best_time + best_time;
         let ratio = trial.time / trial.best_time.max(f32::MIN_POSITIVE);
-        let [shortest, longest] = Self::WAIT;
         // A trial costs ratio − 1 pieces. So trials cost at most two percent of the time.
         let longest = longest.min(Self::FIRST_WAIT * f32::exp2(trial.count as f32));
         trial.wait = (shortest * ratio.powi(3)).clamp(shortest, longest) as u32;
@@ -111,7 +127,8 @@ impl<const N: usize> TimedChoice<N> {
         if ratio < Self::BETTER {
             let Trial { time, best_time, count, .. } = *trial;
             let wait = shortest as u32;
-            self.trials[self.best] = Trial { time: best_time, best_time: time, wait, count };
+            self.trials[self.best] =
+                Trial { time: best_time, best_time: time, wait, count, in_doubt: false };
             for (j, other) in self.trials.iter_mut().enumerate() {
                 if j != self.best && j != k {
                     other.best_time *= ratio;
@@ -171,6 +188,43 @@ mod tests {
         }
         work(&mut choice, 100, seconds);
         assert_eq!(choice.best, 1);
+    }
+
+    #[test]
+    fn a_trial_that_is_interrupted_does_not_rule_the_faster_way_out() {
+        // Other work, for which way 1 is faster. One of its first trials there is interrupted.
+        for interrupted in 0..3 {
+            let mut choice = TimedChoice::<2>::new(0);
+            for _ in 0..200 {
+                let way = choice.next(|_| true).0;
+                choice.learn([1e-6, 3e-6][way]);
+            }
+            let (mut trials, mut slow) = (0, 0);
+            for _ in 0..1000 {
+                let way = choice.next(|_| true).0;
+                slow += u32::from(way == 0);
+                let interruption = if way == 1 && trials == interrupted { 1e-3 } else { 0.0 };
+                trials += u32::from(way == 1);
+                choice.learn([1.5e-6, 1e-6][way] + interruption);
+            }
+            assert!(slow < 300, "trial {interrupted}: the slower way took {slow} of 1000 pieces");
+        }
+    }
+
+    #[test]
+    fn an_interruption_beside_a_trial_does_not_make_the_slower_way_win() {
+        let mut choice = TimedChoice::<2>::new(0);
+        let mut slow = 0;
+        let mut last_was_trial = false;
+        for _ in 0..3000 {
+            let way = choice.next(|_| true).0;
+            slow += u32::from(way == 1);
+            // Each piece after a trial is interrupted for as long as two pieces take.
+            let interruption = if last_was_trial { 2e-6 } else { 0.0 };
+            last_was_trial = way == 1;
+            choice.learn([1e-6, 1.3e-6][way] + interruption);
+        }
+        assert!(slow < 300, "the slower way took {slow} of 3000 pieces");
     }
 
     #[test]
