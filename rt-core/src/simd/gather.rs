@@ -33,14 +33,7 @@ impl<'a> GatherSlice<'a> {
             let [a, b] = unsafe { pairs_avx512(self.values.as_ptr(), &index) };
             return [f32x16::simd_from(simd, a), f32x16::simd_from(simd, b)];
         }
-        let (mut a, mut b) = ([0.0; 16], [0.0; 16]);
-        for lane in 0..16 {
-            let i = index[lane] as usize;
-            // SAFETY: every index is at most `last`, which is two less than the length.
-            (a[lane], b[lane]) =
-                unsafe { (*self.values.get_unchecked(i), *self.values.get_unchecked(i + 1)) };
-        }
-        [f32x16::simd_from(simd, a), f32x16::simd_from(simd, b)]
+        self.pairs_one_by_one(&index).map(|row| f32x16::simd_from(simd, row))
     }
 
     /// `values[i]` for each index, which is clamped to the first of the last pair.
@@ -54,9 +47,27 @@ impl<'a> GatherSlice<'a> {
             let a = unsafe { numbers_avx512(self.values.as_ptr(), &index) };
             return f32x16::simd_from(simd, a);
         }
-        // SAFETY: every index is at most `last`, which is less than the length.
-        let a = index.map(|i| unsafe { *self.values.get_unchecked(i as usize) });
-        f32x16::simd_from(simd, a)
+        f32x16::simd_from(simd, self.numbers_one_by_one(&index))
+    }
+
+    // Not inlined: a gradient reads sixteen pairs of sixteen lanes, and with all of their loads in
+    // one function rt-core took three times as long to compile.
+    #[inline(never)]
+    fn pairs_one_by_one(self, index: &[u32; 16]) -> [[f32; 16]; 2] {
+        let mut out = [[0.0; 16]; 2];
+        for (lane, i) in index.iter().enumerate() {
+            let i = i.min(&self.last);
+            // SAFETY: the index is at most `last`, which is two less than the length.
+            let at = |i: usize| unsafe { *self.values.get_unchecked(i) };
+            (out[0][lane], out[1][lane]) = (at(*i as usize), at(*i as usize + 1));
+        }
+        out
+    }
+
+    #[inline(never)]
+    fn numbers_one_by_one(self, index: &[u32; 16]) -> [f32; 16] {
+        // SAFETY: the index is at most `last`, which is less than the length.
+        index.map(|i| unsafe { *self.values.get_unchecked(i.min(self.last) as usize) })
     }
 }
 

@@ -3,7 +3,7 @@
 use super::{VolumeHighlight, VolumeLight, VolumeOptions, VolumeShading};
 use crate::simd::gather::GatherSlice;
 use crate::simd::vectors::Vec3x16;
-use fearless_simd::{Select, Simd, SimdBase, SimdFloat, f32x16};
+use fearless_simd::{Select, Simd, SimdBase, SimdFloat, SimdFrom, f32x16};
 use glam::Vec3;
 
 /// Exponents of a highlight up to which it is multiplied out in lanes.
@@ -53,6 +53,22 @@ impl PacketLights {
             half_gradient: (f64::from(s.half_gradient) * unit) as f32,
             highlight,
         })
+    }
+
+    /// [`PacketLights::on`] as a function of its own.
+    #[inline(never)]
+    pub(super) fn on_apart<S: Simd>(
+        &self,
+        simd: S,
+        g: Vec3x16<S>,
+        steepness: f32x16<S>,
+        view: Vec3x16<S>,
+        color: [f32x16<S>; 3],
+    ) -> [f32x16<S>; 3] {
+        simd.vectorize(
+            #[inline(always)]
+            || self.on(simd, g, steepness, view, color),
+        )
     }
 
     /// The colours under the lights, at most 1, where the gradients are `g` and rays go along
@@ -150,5 +166,11 @@ fn powers<S: Simd>(simd: S, base: f32x16<S>, exponent: f32) -> f32x16<S> {
         }
         return product;
     }
-    f32x16::from_fn(simd, |lane| base[lane].powf(exponent))
+    f32x16::simd_from(simd, powers_one_by_one(base.into(), exponent))
+}
+
+/// Not inlined, because sixteen calls would stand in each instance of the march.
+#[inline(never)]
+fn powers_one_by_one(base: [f32; 16], exponent: f32) -> [f32; 16] {
+    base.map(|b| b.powf(exponent))
 }

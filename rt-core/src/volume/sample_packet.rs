@@ -7,7 +7,7 @@
 
 use super::MACROCELL;
 use super::sample_gradient::gradient;
-use super::sample_medium::Medium;
+use super::sample_medium::{Cells, Gradients, Medium};
 use crate::ray::LANES;
 use crate::simd::gather::GatherSlice;
 use crate::simd::vectors::{Row, Rows3, Vec3x16};
@@ -82,7 +82,7 @@ impl Medium<'_> {
             if let Some((distances, blocks)) = self.empty {
                 if until_look == 0 {
                     let empty =
-                        self.empty_samples::<S, NEAREST>(simd, distances, blocks, place, step);
+                        self.empty_apart::<S, NEAREST>(simd, distances, blocks, place, step);
                     let least = active.select(empty, s(f32::INFINITY)).reduce_min();
                     if least > 0.0 {
                         number += empty;
@@ -112,14 +112,14 @@ impl Medium<'_> {
                     *c = a + (b - a) * part;
                 }
                 if let Some(gradients) = &self.gradients {
-                    let g = gradient::<S, NEAREST>(simd, self, gradients, &cells);
+                    let g = self.gradient_apart::<S, NEAREST>(simd, gradients, &cells);
                     let steepness = g.dot(g).sqrt();
                     if let Some(factors) = &gradients.factors {
                         opacity *= factors.at(simd, steepness);
                         is_seen = opacity.simd_gt(zero);
                     }
                     if let Some(lights) = gradients.lights {
-                        rgb = lights.on(simd, g, steepness, view, rgb);
+                        rgb = lights.on_apart(simd, g, steepness, view, rgb);
                     }
                 }
 
@@ -151,6 +151,36 @@ impl Medium<'_> {
         half.store_slice(&mut out.half);
         samples.store_slice(&mut out.samples);
         out
+    }
+
+    // Functions of their own, with the instruction set of the caller: inlined into the march, they
+    // took the compiler ten minutes.
+    #[inline(never)]
+    fn gradient_apart<S: Simd, const NEAREST: bool>(
+        &self,
+        simd: S,
+        gradients: &Gradients<'_>,
+        cells: &Cells<S>,
+    ) -> Vec3x16<S> {
+        simd.vectorize(
+            #[inline(always)]
+            || gradient::<S, NEAREST>(simd, self, gradients, cells),
+        )
+    }
+
+    #[inline(never)]
+    fn empty_apart<S: Simd, const NEAREST: bool>(
+        &self,
+        simd: S,
+        distances: GatherSlice<'_>,
+        blocks: UVec3,
+        place: Vec3x16<S>,
+        step: Vec3x16<S>,
+    ) -> f32x16<S> {
+        simd.vectorize(
+            #[inline(always)]
+            || self.empty_samples::<S, NEAREST>(simd, distances, blocks, place, step),
+        )
     }
 
     /// How many samples from here on lie in empty blocks: all of them have no opacity. 0 in other
