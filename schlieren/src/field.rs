@@ -152,9 +152,10 @@ impl Field {
         Ok(Field { dims, spacing_m, origin_m, eps, n0, nodes, not_finite, truncation })
     }
 
-    /// Adds by how much eps would differ if the mesh that it comes from were read by a less accurate
-    /// reconstruction ([`datasets::resample::ResampledField::truncation`]), x fastest, from which
-    /// [`crate::plan::MeasuredError::mesh_rad`] follows. What is not finite is taken as zero.
+    /// Adds by how much eps would differ if the mesh that it comes from were read by a less
+    /// accurate reconstruction ([`datasets::resample::ResampledField::truncation`]), x fastest,
+    /// from which [`crate::plan::MeasuredError::mesh_rad`] follows. What is not finite is taken as
+    /// zero.
     ///
     /// # Errors
     /// If there is not one value for each node.

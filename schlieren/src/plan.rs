@@ -479,8 +479,8 @@ pub(crate) fn sample_starts(
         .collect()
 }
 
-/// Starts of rays through a node and up to two nodes beside it. The largest errors are where a flow has a kink, as
-/// at the axis of a ring, and rays that are spread evenly pass it by.
+/// Starts of rays through a node and up to two nodes beside it. The largest errors are where a flow
+/// has a kink, as at the axis of a ring, and rays that are spread evenly pass it by.
 fn starts_around(field: &Field, node: [usize; 3], view: &View) -> impl Iterator<Item = Start> {
     let h = DVec3::from(field.spacing_m());
     let from_centre = field.origin_m() + h * DVec3::from(node.map(|i| i as f64)) - view.centre_m;

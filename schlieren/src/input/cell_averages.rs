@@ -1,17 +1,18 @@
 //! Values in the middles of a lattice's cells, from averages over the cells.
 //!
-//! Solvers of finite volumes keep averages. The average over a cell of side h differs from the value
-//! in its middle by h²/24 times the second derivatives, which is 4 parts in a thousand of a bell
-//! whose standard deviation is five cells. Differences of the averages give the second derivatives
-//! (as Colella et al., "A high-order finite-volume method for conservation laws on locally refined
-//! grids", Comm. App. Math. Comp. Sci. 2011, eq. 12), and the error is of fourth order then.
+//! Solvers of finite volumes keep averages. The average over a cell of side h differs from the
+//! value in its middle by h²/24 times the second derivatives, which is 4 parts in a thousand of a
+//! bell whose standard deviation is five cells. Differences of the averages give the second
+//! derivatives (McCorquodale and Colella, "A high-order finite-volume method for conservation laws
+//! on locally refined grids", Comm. App. Math. Comp. Sci. 2011), and the error is of fourth order
+//! then.
 
 use rayon::prelude::*;
 
 /// Of the second differences beside it, a cell's counts up to this multiple, and not at all where
 /// their signs differ: what remains at a captured shock is nothing, and smooth extrema keep their
 /// height (Colella and Sekora, "A limiter for PPM that preserves accuracy at smooth extrema",
-/// J. Comput. Phys. 2008, section 2.3).
+/// J. Comput. Phys. 2008).
 const BESIDE: f64 = 1.25;
 
 /// Turns averages over the cells of a uniform lattice, x fastest, into values in their middles.

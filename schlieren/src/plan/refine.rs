@@ -13,14 +13,15 @@ const HIDDEN: f64 = 0.1;
 const STALLED: f64 = 0.7;
 
 impl Plan {
-    /// Measures the error like [`Plan::measure_with`]. While the sum is above the tolerance, refines
-    /// what the request leaves open: straight rays become bent ones, the interpolant becomes the
-    /// spline, and steps become half as long. Where that no longer helps, single precision becomes
-    /// the full march in `f64`.
+    /// Measures the error like [`Plan::measure_with`]. While the sum is above the tolerance,
+    /// refines what the request leaves open: straight rays become bent ones, the interpolant
+    /// becomes the spline, and steps become half as long. Where that no longer helps, single
+    /// precision becomes the full march in `f64`.
     ///
     /// Returns the first plan that is within the tolerance, or the most accurate one. Also stops at
-    /// a tenth of the lattice's own error ([`MeasuredError::resolution_rad`]) or the mesh's, because a
-    /// better march would not show. A tolerance of zero or below is as accurate as possible already.
+    /// a tenth of the lattice's own error ([`MeasuredError::resolution_rad`]) or the mesh's,
+    /// because a better march would not show. A tolerance of zero or below is as accurate as
+    /// possible already.
     pub fn within_tolerance(
         self,
         field: &Field,
