@@ -33,7 +33,7 @@ pub(super) fn probe(common: CommonArgs, args: &ProbeArgs) -> anyhow::Result<()> 
     let section = TestSection::open(&scene, |what| common.note(0, what))?;
     let found = crate::probe::probe(&scene, &section, args.pixel)?;
     for w in &found.warnings {
-        common.warn(&in_options(w));
+        common.warn(in_options(w));
     }
     common.result(&found, || in_words(&found, scene.light.wavelengths_nm[0]))
 }

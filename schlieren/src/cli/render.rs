@@ -195,7 +195,7 @@ pub(super) fn render_and_write(
     }
     let overlay_scale = write(outputs, scene, &rendered, start.elapsed().as_secs_f64())?;
     for w in &rendered.report.warnings {
-        common.warn(&in_options(w));
+        common.warn(in_options(w));
     }
     let r = &rendered.report;
     let json = json!({

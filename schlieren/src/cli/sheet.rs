@@ -143,7 +143,7 @@ pub(super) fn sheet(common: CommonArgs, args: &SheetArgs) -> anyhow::Result<()> 
         output::write_sheet_exr(path, &sheet, &scene, elapsed_secs)?;
     }
     for w in &sheet.report.warnings {
-        common.warn(&in_options(w));
+        common.warn(in_options(w));
     }
     let r = &sheet.report;
     let panels: Vec<_> = sheet

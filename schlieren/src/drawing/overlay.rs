@@ -143,7 +143,8 @@ fn arrows(canvas: &mut Canvas, vectors: &[[f32; 2]], largest: f64, free: &impl F
             let v = vectors[i].map(f64::from);
             let factor = ARROW_PX as f64 / largest;
             let [dx, dy] = v.map(|c| factor * c);
-            if !free(i) || !(dx.hypot(dy) >= 1.0) {
+            let length = dx.hypot(dy);
+            if !free(i) || length.is_nan() || length < 1.0 {
                 continue;
             }
             let at = [x as f64 + 0.5, y as f64 + 0.5];

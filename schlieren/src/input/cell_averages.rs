@@ -33,7 +33,8 @@ pub(super) fn to_middle_values(averages: &[f64], dims: [usize; 3]) -> Vec<f64> {
         let after = second(i + s, at + 1, axis);
         let mut least = own.abs();
         for beside in [before, after].into_iter().flatten() {
-            if !(beside * own > 0.0) {
+            let bends_alike = beside * own > 0.0;
+            if !bends_alike {
                 return None;
             }
             least = least.min(BESIDE * beside.abs());

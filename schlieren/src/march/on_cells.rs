@@ -128,7 +128,7 @@ impl<'a> OnCells<'a> {
     /// The same paths through less accurate values, which tell how accurate the mesh is
     /// ([`datasets::resample::CellField::walker_to_second_degree`]).
     #[must_use]
-    pub(crate) fn to_second_degree(self) -> OnCells<'a> {
+    pub(crate) fn with_second_degree(self) -> OnCells<'a> {
         OnCells { to_second_degree: true, ..self }
     }
 

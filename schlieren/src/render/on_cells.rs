@@ -62,7 +62,7 @@ pub(super) fn planned(
         // tells it.
         if gas.cells().has_polynomials() {
             let mut exits = vec![Exit::UNDISTURBED; starts.len()];
-            let paths = OnCells::new(gas, view, quantities, steps).to_second_degree();
+            let paths = OnCells::new(gas, view, quantities, steps).with_second_degree();
             paths.trace_parallel(&starts, &mut exits);
             mesh_error_rad = Some(compare(&traced[&steps], &exits).0);
         }

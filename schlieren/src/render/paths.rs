@@ -33,6 +33,7 @@ const SKIPPED_WAVES: f64 = 1e-5;
 
 /// What is known of the accuracy of paths before they are traced.
 #[derive(Debug, Clone, Copy)]
+#[allow(clippy::large_enum_variant, reason = "one exists for each image, and is copied")]
 pub(super) enum Accuracy {
     /// The bounds of the plan.
     Bounded,

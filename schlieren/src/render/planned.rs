@@ -11,6 +11,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// A plan's choices, for repeating them.
 #[derive(Debug, Clone, Copy)]
+#[allow(clippy::large_enum_variant, reason = "one exists for each image, and is copied")]
 pub(super) enum Choice {
     /// The march through a lattice.
     Lattice(Plan),
