@@ -243,17 +243,14 @@ mod tests {
     fn a_hole_that_the_mesh_encloses_is_a_body() {
         let n = 9usize;
         let mut hidden = vec![0u8; (n - 1).pow(3)];
-        let mut image = crate::model::ImageData::new([9; 3], DVec3::ZERO, DVec3::ONE);
         let middle = |i: usize| (3..5).contains(&i);
         for (c, h) in hidden.iter_mut().enumerate() {
             let hole = middle(c % 8) && middle(c / 8 % 8) && middle(c / 64);
             *h = u8::from(hole);
         }
-        image.attributes.point.push(DataArray::new("rho", 1, Values::F64(vec![1.0; 729])));
-        // An unstructured copy without the cells of the hole.
-        let mut grid = crate::model::UnstructuredGrid::default();
-        grid.points =
-            Points::F64((0..729).map(|i| [i % 9, i / 9 % 9, i / 81].map(|x| x as f64)).collect());
+        let points = (0..729).map(|i| [i % 9, i / 9 % 9, i / 81].map(|x| x as f64)).collect();
+        let mut grid =
+            crate::model::UnstructuredGrid { points: Points::F64(points), ..Default::default() };
         for (c, _) in hidden.iter().enumerate().filter(|h| *h.1 == 0) {
             let first = c % 8 + 9 * (c / 8 % 8) + 81 * (c / 64);
             grid.types.push(12);
