@@ -425,8 +425,8 @@ impl Plan {
     }
 }
 
-/// Fourth difference of values that are rounded to f32, as a part of the largest value, at most: the
-/// coefficients' sum is 16, and three axes add up.
+/// Fourth difference of values that are rounded to f32, as a part of the largest value, at most:
+/// the coefficients' sum is 16, and three axes add up.
 const ROUNDED_DIFFERENCE: f64 = 32.0 * 0.5 * f32::EPSILON as f64;
 
 /// Step of the rays that tell how well the lattice resolves the flow, in lattice steps.

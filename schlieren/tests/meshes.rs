@@ -109,8 +109,8 @@ fn an_error_of_the_mesh_is_not_that_of_a_fine_lattice() {
         println!("{name}: error {error:.2e}, estimated {mesh:.2e} of the mesh, {others:?}");
         // The disease: the lattice is fine, so that it says nothing.
         assert!(others.iter().all(|e| *e < error), "{name}: {error:.2e} {others:?}");
-        // Where cells are as wide as a third of the bell, a polynomial's third degree adds much more
-        // than its error: 60 times on the hexahedra.
+        // Where cells are as wide as a third of the bell, the third degree adds much more than its
+        // error: 60 times on the hexahedra.
         assert!(error <= mesh && mesh <= 100.0 * error, "{name}: {error:.2e} {mesh:.2e}");
     }
     // Uniform data has a lattice and no mesh.
