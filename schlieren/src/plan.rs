@@ -436,7 +436,7 @@ const RESOLUTION_STEP: f64 = 0.3;
 /// (tests/plan.rs) it is 0.4 to 3.7 times the difference where the flow is resolved. Beyond that,
 /// neither interpolant is near the truth: across a jump from node to node, it is 1.3 to 7 times the
 /// difference, which then is more than a tenth of the largest deflection.
-const RESOLVED: f64 = 2.75;
+const RESOLVED: f64 = 2.5;
 const UNRESOLVED: f64 = 7.5;
 const UNRESOLVED_SHARE: [f64; 2] = [0.1, 0.2];
 

@@ -1,11 +1,10 @@
 //! Finds the points of a data set's values, and converts the values to a uniform lattice.
 
-use super::cell_averages::to_middle_values;
 use super::{Depth, InputError, Options};
 use datasets::model::{Attributes, ColorBy, Dataset, extent_dims};
 use datasets::resample::{
-    self, Lattice, Mark, Mesh, Plane, Reconstruction, Report, Resolution, Samples, Walls,
-    in_bodies, resample as resample_mesh, revolve, revolved_bounds,
+    self, Lattice, Mark, Mesh, Plane, Report, Resolution, Samples, Walls, in_bodies,
+    resample as resample_mesh, revolve, revolved_bounds,
 };
 use glam::{DMat3, DVec3};
 
@@ -16,8 +15,6 @@ pub(super) enum SamplePoints {
         lattice: Lattice,
         /// Axes that run backwards in the file.
         backwards: [bool; 3],
-        /// Whether the values are averages over the cells whose middles the nodes are.
-        of_cells: bool,
     },
     /// Points or cells of a mesh, which has to be resampled.
     Mesh { mesh: Box<Mesh>, per_point: bool, own: Option<Lattice> },
@@ -60,7 +57,7 @@ impl SamplePoints {
             && options.samples_per_axis == 1
         {
             let lattice = if per_point { lattice } else { cell_centres(lattice) };
-            return Ok(SamplePoints::Uniform { lattice, backwards, of_cells: !per_point });
+            return Ok(SamplePoints::Uniform { lattice, backwards });
         }
         let mesh = Box::new(mesh_of(data, options)?);
         Ok(SamplePoints::Mesh { mesh, per_point, own: own.map(|o| o.0) })
@@ -97,7 +94,7 @@ impl SamplePoints {
                 (false, false) => mesh.gather_cells(data, of),
                 (true, false) => mesh.cells_to_points(&mesh.gather_cells(data, of)),
             },
-            SamplePoints::Uniform { lattice, backwards, .. } => {
+            SamplePoints::Uniform { lattice, backwards } => {
                 let leaves = data.leaves();
                 let Some(a) = leaves.first().and_then(|l| l.attributes()) else {
                     return Vec::new();
@@ -142,11 +139,7 @@ impl SamplePoints {
         options: &Options,
     ) -> Result<LatticeValues, InputError> {
         match self {
-            SamplePoints::Uniform { lattice, of_cells, .. } => {
-                let values = match options.reconstruction {
-                    Reconstruction::Cubic if *of_cells => to_middle_values(&values, lattice.dims),
-                    _ => values,
-                };
+            SamplePoints::Uniform { lattice, .. } => {
                 let values: Vec<f32> = values.into_iter().map(|v| v as f32).collect();
                 let mark = |v: &f32| if v.is_finite() { Mark::Inside } else { Mark::NotFinite };
                 let marks = values.iter().map(mark).collect();

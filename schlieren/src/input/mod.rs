@@ -12,7 +12,6 @@
 //! [`load_cells`] makes [`crate::gas_on_cells::GasOnCells`] of the same values instead, without a
 //! lattice.
 
-mod cell_averages;
 mod contents;
 mod evaluate;
 mod lattice;
@@ -183,9 +182,7 @@ pub struct Options {
     pub depth: Option<Depth>,
     /// See [`resample::Options`].
     pub samples_per_axis: usize,
-    /// How values between the points of a mesh are computed when it is resampled, and whether
-    /// averages over cells are taken as averages ([`Reconstruction::Cubic`]) or as the values in
-    /// their middles.
+    /// How values between the points of a mesh are computed when it is resampled.
     pub reconstruction: Reconstruction,
     /// Standard deviation of the shock smoothing in nodes: 0 for none, 1 to 1.4 for shocks that are
     /// one cell wide.
