@@ -36,7 +36,12 @@ pub(crate) fn trace_unless_cancelled(
     true
 }
 
-/// As [`trace_unless_cancelled`], on all threads.
+/// Rays of each thread between two looks at `cancel`: eight pieces of
+/// [`LightPaths::trace_parallel`], so that threads end at about the same time.
+const PER_THREAD: usize = 8 * 1024;
+
+/// As [`trace_unless_cancelled`], on all threads, and in the order of rays that the paths choose.
+/// `progress` gets the number of rays after each piece.
 pub(crate) fn trace_parallel_unless_cancelled(
     paths: &dyn LightPaths,
     starts: &[Start],
@@ -44,23 +49,18 @@ pub(crate) fn trace_parallel_unless_cancelled(
     cancel: &AtomicBool,
     progress: &(dyn Fn(usize) + Sync),
 ) -> bool {
-    use rayon::prelude::*;
-    if paths.rays_at_once().is_none() {
+    let at_once = match paths.rays_at_once() {
+        Some(_) => PER_THREAD * rayon::current_num_threads(),
+        None => starts.len().max(1),
+    };
+    for (starts, exits) in starts.chunks(at_once).zip(exits.chunks_mut(at_once)) {
+        if cancel.load(Ordering::Relaxed) {
+            return false;
+        }
         paths.trace_parallel(starts, exits);
         progress(starts.len());
-        return !cancel.load(Ordering::Relaxed);
     }
-    // As in `LightPaths::trace_parallel`.
-    const CHUNK: usize = 1024;
-    starts
-        .par_chunks(CHUNK)
-        .zip(exits.par_chunks_mut(CHUNK))
-        .map(|(s, e)| {
-            let whole = trace_unless_cancelled(paths, s, e, cancel);
-            progress(s.len());
-            whole
-        })
-        .reduce(|| true, |a, b| a && b)
+    !cancel.load(Ordering::Relaxed)
 }
 
 /// Energy 1 in fixed point. A pixel holds 2³² photons of energy 1 before it overflows. The
