@@ -161,6 +161,8 @@ pub(super) fn sheet(common: CommonArgs, args: &SheetArgs) -> anyhow::Result<()> 
         "march": r.march,
         "tolerance_rad": scene.march.tolerance_rad,
         "deflection_error_rad": r.deflection_error_rad,
+        "resolution_error_rad": r.resolution_error_rad,
+        "mesh_error_rad": r.mesh_error_rad,
         "largest_deflection_rad": r.largest_deflection_rad,
         "outside": section.input.as_ref().and_then(|i| i.outside.clone()),
         "interrupted": sheet.interrupted,

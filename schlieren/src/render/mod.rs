@@ -244,7 +244,7 @@ impl Report {
         }
     }
 
-    fn add_plan(&mut self, planned: &PlannedPaths<'_>) {
+    pub(crate) fn add_plan(&mut self, planned: &PlannedPaths<'_>) {
         self.march.clone_from(&planned.description);
         self.deflection_error_rad = planned.error_rad;
         self.resolution_error_rad = planned.resolution_error_rad;
@@ -451,6 +451,11 @@ fn add_map(
     Ok(())
 }
 
+/// The warning about a flow that is dark from this side.
+pub(crate) const NO_LIGHT: &str = "no light passes the flow: every ray that enters it meets blank or solid cells; set the role \
+     of nodes outside the mesh (flow.outside) and of hidden cells (flow.hidden), or view it from \
+     another side";
+
 /// Warns about images that show nothing: they are correct but rarely wanted.
 fn warn_about_image(scene: &Scene, report: &mut Report) {
     let [low, high] = report.levels;
@@ -476,12 +481,7 @@ fn warn_about_image(scene: &Scene, report: &mut Report) {
             .push(format!("the image is uniform ({low:.4} to {high:.4} of white): {cure}"));
     }
     if report.tally.blocked_in_field > 0 && report.largest_deflection_rad == Some(0.0) {
-        report.warnings.push(
-            "no light passes the flow: every ray that enters it meets blank or solid cells; set \
-             the role of nodes outside the mesh (flow.outside) and of hidden cells (flow.hidden), \
-             or view it from another side"
-                .into(),
-        );
+        report.warnings.push(NO_LIGHT.into());
     }
     if report.tally.not_a_number > 0 {
         report.warnings.push(format!(

@@ -45,7 +45,7 @@ use crate::cutoff::Rgb;
 use crate::film::traced::{corners, start_of_corner};
 use crate::film::{Framing, trace_parallel_unless_cancelled};
 use crate::path::{Exit, LightPaths, PathQuantities, Start, Status};
-use crate::render::{Control, Map, RenderError, Report, TestSection, framing};
+use crate::render::{Control, Map, NO_LIGHT, RenderError, Report, TestSection, framing};
 use crate::scene::{Effects, Scene, TechniqueSpec};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -125,10 +125,7 @@ pub fn render_sheet(
 
     // The light, once for all techniques that follow it.
     let planned = section.paths(&scene, 0, PathQuantities { opd: true }, false, true)?;
-    report.march.clone_from(&planned.description);
-    report.deflection_error_rad = planned.error_rad;
-    report.resolution_error_rad = planned.resolution_error_rad;
-    report.warnings.extend(planned.warnings.iter().cloned());
+    report.add_plan(&planned);
     let part = |done: f64| (control.progress)(LIGHT_PART * done);
     let exits = traced(&*planned.paths, section, &wide, control, &part)?;
     report.counters.rays += exits.len() as u64;
@@ -138,12 +135,7 @@ pub fn render_sheet(
         panels::of_light(&scene, section, &bench, &wide, margin, exits, &planned)?;
     report.largest_deflection_rad = Some(map.largest_deflection_rad);
     if map.dark == map.transmission.len() {
-        report.warnings.push(
-            "no light passes the flow: every ray meets blank or solid places; set what is outside \
-             the mesh (flow.outside) and what hidden cells are (flow.hidden), or view it from \
-             another side"
-                .into(),
-        );
+        report.warnings.push(NO_LIGHT.into());
     }
 
     // The rays from the camera to a background, for BOS.

@@ -160,14 +160,14 @@ pub(super) fn of_light(
         let technique = technique(&setup.scene, 0, wide, n0, false)?;
         let exposure = setup.scene.exposure() as f32;
         let cut = |film: Vec<Rgb>| inner(&film, wide, margin);
-        let film: Vec<Rgb> = if technique.is_colored() {
+        let film: Option<Vec<Rgb>> = if technique.is_colored() {
             let exposed = expose_corners::<3>(*wide, view, &technique, exits.clone());
-            exposed.map(|(f, _)| f.to_pixels(1.0)).unwrap_or_default()
+            exposed.map(|(f, _)| f.to_pixels(1.0))
         } else {
             let exposed = expose_corners::<1>(*wide, view, &technique, exits.clone());
-            let grey = exposed.map(|(f, _)| f.to_pixels(1.0)).unwrap_or_default();
-            grey.into_iter().map(|p| [p[0]; 3]).collect()
+            exposed.map(|(f, _)| f.to_pixels(1.0).into_iter().map(|p| [p[0]; 3]).collect())
         };
+        let Some(film) = film else { unreachable!("the exits are those of the corners") };
         let pixels = cut(film.into_iter().map(|p| p.map(|v| v * exposure)).collect());
         panels.push(Panel {
             name: setup.name,
