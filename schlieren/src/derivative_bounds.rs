@@ -170,9 +170,7 @@ impl Row {
             eps: f64::from(nodes.iter().fold(0.0f32, |m, e| m.max(e.abs()))),
         }
     }
-}
 
-impl Row {
     /// The node in the middle of the row's largest fourth difference.
     fn node_of_fourth(&self, j: usize, k: usize, dims: [usize; 3]) -> [usize; 3] {
         let squares = self.squares[3].iter().enumerate();

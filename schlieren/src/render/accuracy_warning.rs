@@ -20,7 +20,8 @@ pub(super) fn accuracy_warning(achieved: &MeasuredError, request: &Request) -> O
         true => "no finer one helps".to_owned(),
         false => format!("leave {set} to the plan"),
     };
-    let lattice = "use a finer lattice, or smooth shocks: flow.smoothing_nodes, --smoothing";
+    let lattice = "use a finer one, where it comes from a mesh by flow.resample_nodes, --resample, \
+                   or smooth shocks by flow.smoothing_nodes, --smoothing";
     let parts = [
         ErrorPart { what: "the march", rad: achieved.max_rad, cure: march },
         ErrorPart {

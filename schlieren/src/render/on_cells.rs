@@ -75,7 +75,7 @@ pub(super) fn planned(
         PlannedPaths::new(Box::new(paths), description, None, &request, (Bend::Full, 1.0));
     planned.choice = Some(Choice::Cells { steps });
     if let Some(rad) = error_rad {
-        let cure = "the values change within a cell more than its steps follow".to_owned();
+        let cure = "values change within cells more than steps follow: use a finer mesh".to_owned();
         let steps = ErrorPart { what: "the march", rad, cure };
         planned.warnings.extend(warning([steps, of_mesh(mesh_error_rad)], tolerance_rad));
     }
