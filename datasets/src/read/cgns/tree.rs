@@ -48,26 +48,30 @@ impl Tree {
 
     /// The nodes below a node, in the order of the file; links are followed.
     pub(super) fn children(&self, node: &Node) -> Result<Vec<Node>, Fault> {
-        self.below(node, None, 0)
-    }
-
-    /// Nodes below one, all or those with a name.
-    fn below(&self, node: &Node, only: Option<&str>, depth: usize) -> Result<Vec<Node>, Fault> {
         let mut out = Vec::new();
-        let object = node.object()?;
-        for (name, child) in object.children(&mut Vec::new())? {
-            // Names that begin with a space are those of the mapping itself.
-            if name.starts_with(' ') || child.is_dataset() || only.is_some_and(|o| o != name) {
-                continue;
-            }
-            let label = child.text("label")?.unwrap_or_default();
-            let is_link = child.text("type")?.is_some_and(|t| t == "LK");
-            let path = format!("{}/{name}", node.path);
-            let (file, address) = (node.file.clone(), child.address);
-            let own = Node { file, address, path, name, label };
-            out.push(if is_link { self.follow(&own, depth)? } else { own });
+        for (name, child) in node.object()?.children(&mut Vec::new())? {
+            out.extend(self.child(node, &name, &child, 0)?);
         }
         Ok(out)
+    }
+
+    /// A node below another; `None` for what belongs to the mapping itself.
+    fn child(
+        &self,
+        parent: &Node,
+        name: &str,
+        object: &Object<'_>,
+        depth: usize,
+    ) -> Result<Option<Node>, Fault> {
+        if name.starts_with(' ') || object.is_dataset() {
+            return Ok(None);
+        }
+        let label = object.text("label")?.unwrap_or_default();
+        let is_link = object.text("type")?.is_some_and(|t| t == "LK");
+        let path = format!("{}/{name}", parent.path);
+        let (file, address, name) = (parent.file.clone(), object.address, name.to_string());
+        let own = Node { file, address, path, name, label };
+        Ok(Some(if is_link { self.follow(&own, depth)? } else { own }))
     }
 
     /// The node that a link leads to, under the name of the link.
@@ -97,7 +101,11 @@ impl Tree {
             }
         };
         for step in to.split('/').filter(|s| !s.is_empty()) {
-            let next = self.below(&node, Some(step), depth + 1)?.into_iter().next();
+            // By its name: thousands of zones with a link each must not be opened for each.
+            let next = match node.object()?.find(step)? {
+                Some(object) => self.child(&node, step, &object, depth + 1)?,
+                None => None,
+            };
             node = next.ok_or_else(|| {
                 let what = format!("it leads to `{to}`, but `{}` has no `{step}`", node.path);
                 Fault::new(at(), what, BROKEN)
