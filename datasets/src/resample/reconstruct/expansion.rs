@@ -134,12 +134,12 @@ impl Expansion {
     #[inline]
     pub(super) fn parts_at(&self, d: DVec3) -> [f64; 2] {
         let terms = monomials(in_frame(&self.frame, d));
-        let add = |from: f64, range: Range<usize>| {
+        let of = |range: Range<usize>| -> f64 {
             let terms = self.terms[range.clone()].iter().zip(&terms[range]);
-            terms.fold(from, |sum, (c, m)| sum + f64::from(*c) * m)
+            terms.map(|(c, m)| f64::from(*c) * m).sum()
         };
-        let change = f64::from(self.constant) + add(0.0, 0..TERMS);
-        let third = add(0.0, TERMS_TO_DEGREE[2]..TERMS);
+        let third = of(TERMS_TO_DEGREE[2]..TERMS);
+        let change = f64::from(self.constant) + (of(0..TERMS_TO_DEGREE[2]) + third);
         let change = change.clamp(f64::from(self.low), f64::from(self.high));
         [change, if self.is_whole() { third } else { UNRESOLVED * change }]
     }
