@@ -93,18 +93,20 @@ fn a_collated_case_is_the_decomposed_one() {
     }
 }
 
+/// The message about a case in one of whose files a text is replaced.
+fn fault_of(mut files: Vec<CaseFile>, name: &str, from: &str, to: &str) -> String {
+    let file = files.iter_mut().find(|f| f.0 == name).unwrap();
+    let text = String::from_utf8(file.1.clone()).unwrap();
+    assert!(text.contains(from), "{text}");
+    file.1 = text.replace(from, to).into_bytes();
+    let dir = tempfile::tempdir().unwrap();
+    write(dir.path(), &files);
+    open(dir.path()).map(|_| ()).unwrap_err().to_string()
+}
+
 #[test]
 fn faults_of_a_collated_case_name_the_part() {
-    let replaced = |name: &str, from: &str, to: &str| {
-        let mut files = collated(Form::Text, 2);
-        let file = files.iter_mut().find(|f| f.0 == name).unwrap();
-        let text = String::from_utf8(file.1.clone()).unwrap();
-        assert!(text.contains(from), "{text}");
-        file.1 = text.replace(from, to).into_bytes();
-        let dir = tempfile::tempdir().unwrap();
-        write(dir.path(), &files);
-        open(dir.path()).map(|_| ()).unwrap_err().to_string()
-    };
+    let replaced = |name, from, to| fault_of(collated(Form::Text, 2), name, from, to);
     for (name, from, to, words) in [
         ("processors2/0.25/T", "\n312", "\nwar", ["`war", "in the block of part 1"]),
         (
@@ -181,16 +183,7 @@ fn points_that_move_are_those_of_the_last_time_they_were_written() {
 
 #[test]
 fn faults_name_the_file_the_place_and_a_cure() {
-    let replaced = |name: &str, from: &str, to: &str| {
-        let mut files = case(Form::Text, "patch");
-        let file = files.iter_mut().find(|f| f.0 == name).unwrap();
-        let text = String::from_utf8(file.1.clone()).unwrap();
-        assert!(text.contains(from), "{text}");
-        file.1 = text.replace(from, to).into_bytes();
-        let dir = tempfile::tempdir().unwrap();
-        write(dir.path(), &files);
-        open(dir.path()).map(|_| ()).unwrap_err().to_string()
-    };
+    let replaced = |name, from, to| fault_of(case(Form::Text, "patch"), name, from, to);
     for (name, from, to, words) in [
         ("0.25/T", "\n3\n(", "\n4\n(", ["0.25/T", "4 values for 3 cells"]),
         ("0.25/T", "\n311", "\nwarm", ["in line 18", "`warm"]),

@@ -2,10 +2,11 @@
 
 use super::Cells;
 
-const TETRA: u8 = 10;
-const HEXAHEDRON: u8 = 12;
-const WEDGE: u8 = 13;
-const PYRAMID: u8 = 14;
+/// VTK's numbers of the linear solids.
+pub(crate) const TETRA: u8 = 10;
+pub(crate) const HEXAHEDRON: u8 = 12;
+pub(crate) const WEDGE: u8 = 13;
+pub(crate) const PYRAMID: u8 = 14;
 /// VTK's number of a cell that is given by its faces.
 pub(crate) const POLYHEDRON: u8 = 42;
 

@@ -3,6 +3,7 @@
 //! Source: SIDS, section 3.3 "Unstructured Grid Element Numbering Conventions", and VTK's
 //! `vtkCellType.h` for the order of the nodes.
 
+use crate::model::shape_of_faces::{HEXAHEDRON, PYRAMID, TETRA, WEDGE};
 use crate::model::{Cells, Points};
 use crate::read::wedge;
 
@@ -27,10 +28,6 @@ pub(super) struct Element {
 const LINE: u8 = 3;
 const TRIANGLE: u8 = 5;
 const QUAD: u8 = 9;
-const TETRA: u8 = 10;
-const HEXA: u8 = 12;
-const WEDGE: u8 = 13;
-const PYRAMID: u8 = 14;
 const QUADRATIC_HEXA: u8 = 25;
 const QUADRATIC_WEDGE: u8 = 26;
 const TRIQUADRATIC_HEXA: u8 = 29;
@@ -55,7 +52,7 @@ impl Element {
             14 => ("PENTA_6", 6, 6, 3, WEDGE),
             15 => ("PENTA_15", 15, 15, 3, QUADRATIC_WEDGE),
             16 => ("PENTA_18", 18, 18, 3, BIQUADRATIC_WEDGE),
-            17 => ("HEXA_8", 8, 8, 3, HEXA),
+            17 => ("HEXA_8", 8, 8, 3, HEXAHEDRON),
             18 => ("HEXA_20", 20, 20, 3, QUADRATIC_HEXA),
             19 => ("HEXA_27", 27, 27, 3, TRIQUADRATIC_HEXA),
             21 => ("PYRA_13", 13, 13, 3, 27),
@@ -72,9 +69,9 @@ impl Element {
             34 => ("PENTA_24", 24, 6, 3, WEDGE),
             35 => ("PENTA_38", 38, 6, 3, WEDGE),
             36 => ("PENTA_40", 40, 6, 3, WEDGE),
-            37 => ("HEXA_32", 32, 8, 3, HEXA),
-            38 => ("HEXA_56", 56, 8, 3, HEXA),
-            39 => ("HEXA_64", 64, 8, 3, HEXA),
+            37 => ("HEXA_32", 32, 8, 3, HEXAHEDRON),
+            38 => ("HEXA_56", 56, 8, 3, HEXAHEDRON),
+            39 => ("HEXA_64", 64, 8, 3, HEXAHEDRON),
             40 => ("BAR_5", 5, 2, 1, LINE),
             41 => ("TRI_12", 12, 3, 2, TRIANGLE),
             42 => ("TRI_15", 15, 3, 2, TRIANGLE),
@@ -89,9 +86,9 @@ impl Element {
             51 => ("PENTA_33", 33, 6, 3, WEDGE),
             52 => ("PENTA_66", 66, 6, 3, WEDGE),
             53 => ("PENTA_75", 75, 6, 3, WEDGE),
-            54 => ("HEXA_44", 44, 8, 3, HEXA),
-            55 => ("HEXA_98", 98, 8, 3, HEXA),
-            56 => ("HEXA_125", 125, 8, 3, HEXA),
+            54 => ("HEXA_44", 44, 8, 3, HEXAHEDRON),
+            55 => ("HEXA_98", 98, 8, 3, HEXAHEDRON),
+            56 => ("HEXA_125", 125, 8, 3, HEXAHEDRON),
             _ => return None,
         };
         Some(Element { name, nodes, kept, axes, vtk })

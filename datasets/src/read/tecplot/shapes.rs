@@ -1,6 +1,7 @@
 //! Finite elements of Tecplot as VTK's cells.
 
 use crate::model::Cells;
+use crate::model::shape_of_faces::{HEXAHEDRON, PYRAMID, TETRA, WEDGE};
 
 /// A kind of element.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -40,10 +41,6 @@ impl Element {
 const LINE: u8 = 3;
 const TRIANGLE: u8 = 5;
 const QUAD: u8 = 9;
-const TETRA: u8 = 10;
-const HEXAHEDRON: u8 = 12;
-const WEDGE: u8 = 13;
-const PYRAMID: u8 = 14;
 
 /// The elements as cells. Tecplot has no wedges and pyramids: solvers write them as bricks with
 /// corners that coincide, and triangles among quads with the last corner twice.
