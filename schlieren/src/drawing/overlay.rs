@@ -122,7 +122,11 @@ pub fn draw_overlay(canvas: &mut Canvas, map: &Map, overlay: Overlay) -> f64 {
         0 => 0.0,
         n => lengths[(n * 99 / 100).min(n - 1)],
     };
-    let scale = round_below(largest);
+    let scale = match overlay.style {
+        Style::Arrows => round_below(largest),
+        // The colours end where the vectors do: a round number below left half of a jet in one.
+        Style::Lic => largest,
+    };
     match overlay.style {
         Style::Arrows => arrows(canvas, vectors, largest, &free),
         Style::Lic => lic(canvas, vectors, scale, &free),
