@@ -244,8 +244,8 @@ pub struct ResampledField {
     pub values: Vec<f32>,
     /// About the error that the mesh itself makes, whatever the lattice: by how much the values
     /// would differ with polynomials of second degree instead of third. Where none fits, three
-    /// times what is added to the linear elements. Empty with [`Reconstruction::Linear`], which
-    /// has nothing to compare with.
+    /// times what slopes add to the linear elements before they are limited. Empty with
+    /// [`Reconstruction::Linear`], which has nothing to compare with.
     pub truncation: Vec<f32>,
     /// The mark of each node.
     pub marks: Vec<Mark>,

@@ -32,7 +32,8 @@ const QUADRATIC_SHARE: f64 = 0.7;
 
 /// Where a polynomial gives way, the error is larger than what is left of it adds: a step between
 /// two points may be anywhere between them. Of a shock that is half as thick as a tetrahedron is
-/// wide, deflections are 7 times the difference that this makes once.
+/// wide, deflections are 7 times the difference that this makes once. What is left is counted with
+/// the whole gradient: at a sharp step the limited one is zero, as if nothing were in doubt.
 const UNRESOLVED: f64 = 3.0;
 
 /// Number of samples that limit a gradient: on a cubic grid, those that share a cell.
@@ -60,6 +61,8 @@ pub(in crate::resample) struct Expansion {
     /// What is added to the point's value, and the coefficients of the monomials.
     constant: f32,
     terms: [f32; TERMS],
+    /// What limits took from the terms of first degree.
+    taken: [f32; 3],
     /// Bounds of what is added to the point's value.
     low: f32,
     high: f32,
@@ -81,6 +84,7 @@ impl Expansion {
             frame: [0.0; 6],
             constant: 0.0,
             terms: [0.0; TERMS],
+            taken: [0.0; 3],
             low: 0.0,
             high: 0.0,
             state,
@@ -107,6 +111,9 @@ impl Expansion {
         }
         let factor = (1.0 - UNRESOLVED) as f32;
         parts.terms.iter_mut().for_each(|c| *c *= factor);
+        for (term, taken) in parts.terms.iter_mut().zip(self.taken) {
+            *term -= UNRESOLVED as f32 * taken;
+        }
         parts.constant *= factor;
         let [low, high] = parts.bounds;
         parts.bounds = [factor * high, factor * low];
@@ -129,8 +136,8 @@ impl Expansion {
     }
 
     /// What is added to the point's value at distance `d`, and the part of it that a less accurate
-    /// polynomial would leave out: the third powers, or [`UNRESOLVED`] times all where the
-    /// polynomial is not whole.
+    /// polynomial would leave out: the third powers, or [`UNRESOLVED`] times all, before limits,
+    /// where the polynomial is not whole.
     #[inline]
     pub(super) fn parts_at(&self, d: DVec3) -> [f64; 2] {
         let terms = monomials(in_frame(&self.frame, d));
@@ -140,8 +147,12 @@ impl Expansion {
         };
         let third = of(TERMS_TO_DEGREE[2]..TERMS);
         let change = f64::from(self.constant) + (of(0..TERMS_TO_DEGREE[2]) + third);
-        let change = change.clamp(f64::from(self.low), f64::from(self.high));
-        [change, if self.is_whole() { third } else { UNRESOLVED * change }]
+        let bounded = |x: f64| x.clamp(f64::from(self.low), f64::from(self.high));
+        if self.is_whole() {
+            return [bounded(change), third];
+        }
+        let taken: f64 = self.taken.iter().zip(&terms).map(|(c, m)| f64::from(*c) * m).sum();
+        [bounded(change), UNRESOLVED * bounded(change + taken)]
     }
 }
 
@@ -291,11 +302,13 @@ impl Fit {
         let Some(solution) = best else { return Expansion::nothing(State::FewNeighbours) };
         let share = share_of(solution.residual);
         let mut coefficients = solution.coefficients.map(|c| share * c);
+        let mut taken = DVec3::ZERO;
         if share < 1.0 {
             let gradient = limited(solution.gradient, within(&self.samples, ADJACENT));
             for (sum, g) in coefficients[1..].iter_mut().zip(gradient.to_array()) {
                 *sum += (1.0 - share) * 0.5 * g;
             }
+            taken = (1.0 - share) * 0.5 * (solution.gradient - gradient);
         }
         let slack = BEYOND * (high - low);
         let [constant, terms @ ..] = coefficients.map(|c| c as f32);
@@ -303,6 +316,7 @@ impl Fit {
             frame,
             constant,
             terms,
+            taken: taken.as_vec3().to_array(),
             low: (low - slack) as f32,
             high: (high + slack) as f32,
             state: match (share, solution.degree) {

@@ -38,7 +38,7 @@ use rayon::prelude::*;
 pub enum Reconstruction {
     /// By the linear, bilinear and trilinear functions of the cells. Gradients jump at the faces.
     Linear,
-    /// By polynomials of third degree, or limited gradients where none fits. Needs about 120 bytes
+    /// By polynomials of third degree, or limited gradients where none fits. Needs about 130 bytes
     /// for each point of the mesh.
     #[default]
     Cubic,

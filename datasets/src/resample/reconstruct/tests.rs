@@ -289,7 +289,9 @@ fn truncation_is_nothing_for_quadratic_fields_and_above_the_error_of_a_bell() {
     let truncation = largest(&of_bell.truncation);
     assert!(error < truncation && truncation < 20.0 * error, "{error} {truncation}");
     let step = |p: DVec3| f64::from(u8::from(p.x + 0.3 * p.y > 0.6));
-    // Where no polynomial fits, all that is added to the elements counts.
-    assert!(largest(&on(step, Reconstruction::Cubic).truncation) > 0.05);
+    // Limited slopes add nothing to the elements at a sharp step, whose place is in doubt all the
+    // same.
+    let at_step = largest(&on(step, Reconstruction::Cubic).truncation);
+    assert!(at_step > 0.05, "{at_step}");
     assert!(on(step, Reconstruction::Linear).truncation.is_empty());
 }
