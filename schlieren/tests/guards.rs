@@ -59,6 +59,7 @@ fn vectors_names_and_sizes_are_named_with_cures_that_exist_here() {
             "set --temperature-zero to",
         ),
         ("flow.vti", &["--temperature", "295", "--pressure", "rho"], 0, "--pressure-unit"),
+        ("flow.vti", &["--temperature", "295", "--pressure", "rho"], 0, "set --pressure-zero to"),
         ("flow.vti", &["--density", "rho", "--density-unit", "1000"], 0, "--density-unit"),
         ("mm.vti", &["--density", "rho"], 0, "set --length-unit to 0.001"),
         ("flow.vti", &["--density", "rho", "--spacing", "0.1"], 1, "leave it out"),
@@ -79,6 +80,10 @@ fn vectors_names_and_sizes_are_named_with_cures_that_exist_here() {
     let celsius = ["--temperature", "T", "--temperature-zero", "273.15", "--pressure", "101325"];
     let o = render(&path("flow.vti"), &celsius);
     assert!(!text(&o.stderr).contains("--temperature-zero"), "{}", text(&o.stderr));
+    let gauge = ["--temperature", "295", "--pressure", "rho", "--pressure-zero", "101325"];
+    let o = render(&path("flow.vti"), &gauge);
+    assert_eq!(o.status.code(), Some(0), "{}", text(&o.stderr));
+    assert!(!text(&o.stderr).contains("--pressure"), "{}", text(&o.stderr));
 }
 
 #[test]

@@ -27,6 +27,7 @@ _NAMES = {
     "flow.temperature_zero_k to 273.15": "temperature_unit to 'degC'",
     "flow.temperature_zero_k": "temperature_unit",
     "flow.pressure_unit_pa": "pressure_unit",
+    "set flow.pressure_zero_pa to 101325 if": "add 101325 Pa to it if",
     "flow.length_unit_m": "length_unit",
     "flow.average_jumps": "smoothing_nodes='auto'",
     "give it as --solid FILE": "give it to solids",

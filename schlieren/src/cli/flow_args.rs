@@ -31,6 +31,9 @@ pub(super) struct FlowArgs {
     /// Pa per unit of the pressure array
     #[arg(long, value_name = "NUMBER")]
     pressure_unit: Option<f64>,
+    /// Added to the pressure in Pa: 101325 when it is relative to the atmosphere
+    #[arg(long, value_name = "PA", allow_hyphen_values = true)]
+    pressure_zero: Option<f64>,
     /// Array with the relative humidity, 0 to 1
     #[arg(long, value_name = "NAME")]
     humidity: Option<String>,
@@ -133,6 +136,7 @@ impl FlowArgs {
         f.density_unit_kg_m3 = a.density_unit.or(f.density_unit_kg_m3);
         f.temperature_zero_k = a.temperature_zero.or(f.temperature_zero_k);
         f.pressure_unit_pa = a.pressure_unit.or(f.pressure_unit_pa);
+        f.pressure_zero_pa = a.pressure_zero.or(f.pressure_zero_pa);
         f.spacing = a.spacing.or(f.spacing);
         f.origin = a.origin.or(f.origin);
         f.length_unit_m = a.length_unit.unwrap_or(f.length_unit_m);

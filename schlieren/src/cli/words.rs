@@ -3,10 +3,11 @@
 use datasets::cli::{Interrupted, UsageError};
 
 /// Keys of a scene with the options of the same meaning. Longer keys come before their beginnings.
-const OPTIONS: [(&str, &str); 38] = [
+const OPTIONS: [(&str, &str); 39] = [
     ("flow.density_unit_kg_m3", "--density-unit"),
     ("flow.temperature_zero_k", "--temperature-zero"),
     ("flow.pressure_unit_pa", "--pressure-unit"),
+    ("flow.pressure_zero_pa", "--pressure-zero"),
     ("flow.length_unit_m", "--length-unit"),
     ("flow.resample_nodes", "--resample"),
     ("flow.resample_samples", "--resample-samples"),

@@ -260,8 +260,8 @@ fn plausible(t: &Option<Spread>, p: &Option<Spread>, report: &mut Report) {
             let value = if s.high > high { s.high } else { s.low };
             report.warnings.push(format!(
                 "pressure {value} Pa is not plausible ({low}..{high}); give its unit as \
-                 flow.pressure_unit_pa (100000 for bar); one relative to the atmosphere has to be \
-                 made absolute first"
+                 flow.pressure_unit_pa (100000 for bar), or set flow.pressure_zero_pa to 101325 if \
+                 it is relative to the atmosphere"
             ));
         }
     }

@@ -180,7 +180,7 @@ fn numbers_that_cannot_be_true_are_named_with_their_cure() {
     warned(
         vec![("p", true, ramp(27, -3.0, 0.2))],
         tp(Quantity::constant(300.0), Quantity::array("p")),
-        "101325 as offset",
+        "set flow.pressure_zero_pa to 101325",
     );
     // The suggested corrections work.
     let data = image([3, 3, 3], vec![("r", true, normalised)]);

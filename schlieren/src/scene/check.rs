@@ -83,6 +83,7 @@ impl Scene {
         }
         finite("flow.origin", &flow.origin.unwrap_or_default())?;
         finite("flow.temperature_zero_k", &[flow.temperature_zero_k.unwrap_or(0.0)])?;
+        finite("flow.pressure_zero_pa", &[flow.pressure_zero_pa.unwrap_or(0.0)])?;
         within("flow.smoothing_nodes", flow.smoothing_nodes, 0.0, 100.0)?;
         within("flow.resample_samples", flow.resample_samples as f64, 1.0, 8.0)?;
         flow.medium().map(|_| ())

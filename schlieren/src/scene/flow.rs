@@ -37,6 +37,9 @@ pub struct FlowSpec {
     /// Pa per unit of the pressure.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pressure_unit_pa: Option<f64>,
+    /// Added to the pressure in Pa: 101325 when it is relative to the atmosphere.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pressure_zero_pa: Option<f64>,
     /// Relative humidity, 0 to 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub humidity: Option<String>,
@@ -154,6 +157,7 @@ impl Default for FlowSpec {
             temperature_zero_k: None,
             pressure: None,
             pressure_unit_pa: None,
+            pressure_zero_pa: None,
             humidity: None,
             co2_ppm: None,
             n_minus_1: None,
@@ -248,6 +252,7 @@ impl FlowSpec {
             ("density_unit_kg_m3", self.density_unit_kg_m3.is_some(), only == "density"),
             ("pressure", self.pressure.is_some(), by_state),
             ("pressure_unit_pa", self.pressure_unit_pa.is_some(), by_state),
+            ("pressure_zero_pa", self.pressure_zero_pa.is_some(), by_state),
             ("temperature_zero_k", self.temperature_zero_k.is_some(), by_state),
             ("humidity", self.humidity.is_some(), by_state),
             ("co2_ppm", self.co2_ppm.is_some(), by_state),
@@ -281,7 +286,9 @@ impl FlowSpec {
                     temperature: text(&self.temperature)
                         .unwrap_or(Quantity::constant(f64::NAN))
                         .shifted(self.temperature_zero_k.unwrap_or(0.0)),
-                    pressure: pressure.scaled(self.pressure_unit_pa.unwrap_or(1.0)),
+                    pressure: pressure
+                        .scaled(self.pressure_unit_pa.unwrap_or(1.0))
+                        .shifted(self.pressure_zero_pa.unwrap_or(0.0)),
                     humidity: text(&self.humidity).unwrap_or(Quantity::constant(0.0)),
                     co2_ppm: text(&self.co2_ppm).unwrap_or(Quantity::constant(450.0)),
                     species: species()?,
@@ -398,12 +405,13 @@ mod tests {
     fn units_reach_the_medium() {
         let m = flow(
             "temperature = \"T\"\ntemperature_zero_k = 273.15\npressure \
-             = \"1013.25\"\npressure_unit_pa = 100.0",
+             = \"3.25\"\npressure_unit_pa = 100.0\npressure_zero_pa = 101000.0",
         );
         let Ok(Medium::TemperaturePressure { temperature, pressure, .. }) = m else {
             panic!("{m:?}")
         };
         assert_eq!((temperature.offset, pressure.scale), (273.15, 100.0));
-        assert_eq!(pressure.source, crate::input::Source::Constant(1013.25));
+        assert_eq!(pressure.offset, 101_000.0);
+        assert_eq!(pressure.source, crate::input::Source::Constant(3.25));
     }
 }
