@@ -251,9 +251,8 @@ fn main() -> ExitCode {
             }
         }
         Ok(Command::Systems(options)) => {
-            let build = main_job::build_folder(&workspace_root(), build_folder_named());
-            let place = systems::Place { root: &workspace_root(), build, may_install: true };
-            match systems::run(&place, &options) {
+            let root = workspace_root();
+            match systems::run(&systems::Place::of(&root, true), &options) {
                 Outcome::Passed => Exit::Success,
                 Outcome::NotRun(why) => {
                     println!("not run: {why}");

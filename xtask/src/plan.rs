@@ -135,7 +135,7 @@ pub(crate) const STEPS: &[Step] = &[
         action: cargo(&["test", "--workspace", "--no-fail-fast", "--doc"]),
     },
     Step {
-        name: "next-systems",
+        name: systems::STEP,
         tells: "the comparisons with stock VTK and OpenGL programs pass on the next release of \
                 Debian too, where chroots are allowed",
         action: Action::Call(systems::check),

@@ -7,7 +7,7 @@ use std::time::Instant;
 use crate::peers::{self, Install, Peers};
 use crate::plan::{PEERS, STEPS};
 use crate::step::{Action, Context, Outcome, Step};
-use crate::{Exit, TestOptions};
+use crate::{Exit, TestOptions, systems};
 
 /// Runs the steps that `options` selects and prints the summary.
 pub(crate) fn run(root: &Path, options: &TestOptions) -> Exit {
@@ -21,7 +21,13 @@ pub(crate) fn run(root: &Path, options: &TestOptions) -> Exit {
     let mut run = Run { chosen: &chosen, report: vec![], exit: None };
     let early = chosen.iter().take_while(|s| runs_beside_set_up(s)).count();
     let peers = std::thread::scope(|scope| {
-        let set_up = scope.spawn(|| (peers::set_up(root, install), started.elapsed()));
+        let set_up = scope.spawn(|| {
+            let set_up = (peers::set_up(root, install), started.elapsed());
+            if chosen.iter().any(|s| s.name == systems::STEP) {
+                systems::prepare(root, !options.keep_machine);
+            }
+            set_up
+        });
         run.steps(0..early, &Context { root, options, peers: &Peers::default() });
         match set_up.join() {
             Ok((peers, took)) => {

@@ -71,14 +71,30 @@ pub(crate) struct Place<'a> {
     pub(crate) may_install: bool,
 }
 
+impl<'a> Place<'a> {
+    /// In cargo's build folder of the workspace `root`.
+    pub(crate) fn of(root: &'a Path, may_install: bool) -> Place<'a> {
+        let build = crate::main_job::build_folder(root, crate::build_folder_named());
+        Place { root, build, may_install }
+    }
+}
+
+/// The step that [`prepare`] saves time for.
+pub(crate) const STEP: &str = "next-systems";
+
+/// Makes the system that [`check`] needs, beside other steps: it mostly waits for the network.
+/// What fails here fails again in `check`, which reports it.
+pub(crate) fn prepare(root: &Path, may_install: bool) {
+    let place = Place::of(root, may_install);
+    if chroot::allowed(place.may_install).is_ok() {
+        let _ = Chroot::make(&place, &SUITES[0], false);
+    }
+}
+
 /// The step `next-systems`: the first suite without ParaView, with the tests that `build-tests`
 /// built.
 pub(crate) fn check(context: &Context<'_>) -> Outcome {
-    let place = Place {
-        root: context.root,
-        build: crate::main_job::build_folder(context.root, crate::build_folder_named()),
-        may_install: !context.options.keep_machine,
-    };
+    let place = Place::of(context.root, !context.options.keep_machine);
     let suite = SUITES[0].name.to_owned();
     let options = SystemsOptions { suite, paraview: false, record: false };
     run(&place, &options)
