@@ -243,7 +243,7 @@ pub struct ResampledField {
     /// Values at the nodes, x fastest; NaN where the mark is not [`Mark::Inside`].
     pub values: Vec<f32>,
     /// About the error that the mesh itself makes, whatever the lattice: by how much the values
-    /// would differ with polynomials of second degree instead of third. Where none fits, three
+    /// would differ with polynomials of second degree instead of third. Where none fits, four
     /// times what slopes add to the linear elements before they are limited. Empty with
     /// [`Reconstruction::Linear`], which has nothing to compare with.
     pub truncation: Vec<f32>,
