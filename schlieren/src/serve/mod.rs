@@ -10,6 +10,7 @@
 mod filter_plane;
 mod flow;
 mod frame;
+mod legend;
 mod merge_patch;
 mod routes;
 mod session;

@@ -15,10 +15,14 @@
 mod files;
 mod levels;
 
-use super::filter_plane::FilterPlane;
+use super::filter_plane::{FilterPlane, legend_half_rad};
 use super::flow::Flow;
 use super::frame::{DeflectionMap, Frame, FrameInfo};
+use super::legend::Legend;
 use super::session::{Session, chain};
+use crate::drawing::{Canvas, Overlay, draw_overlay};
+use crate::film::Framing;
+use crate::input::Outside;
 use crate::path::PathQuantities;
 use crate::render::{self, Control, Layers, Map, RenderError, RenderOutput, TestSection, framing};
 use crate::scene::{FlowSpec, MarchSpec, Scene, ViewSpec};
@@ -169,7 +173,7 @@ impl Worker {
             error: Some(error),
             ..FrameInfo::default()
         };
-        session.publish(Frame::new(info, None, None, None));
+        session.publish(Frame::new(info, None, None, None, None));
         true
     }
 
@@ -380,6 +384,18 @@ impl Worker {
         traced: &Arc<DeflectionMap>,
     ) -> Result<(), RenderError> {
         let filter = FilterPlane::new(scene, Some(&traced.map))?;
+        let half_rad = legend_half_rad(scene, &traced.map);
+        // Drafts keep the legend that is shown.
+        let legend = if info.draft { None } else { Legend::new(scene, half_rad)? };
+        let (mut axes, mut flow_center_m, mut whole_width_m) = ([[0.0; 3]; 3], [0.0; 3], 0.0);
+        if let Some(Section { full, .. }) = &self.section {
+            let view = &full.view;
+            axes = [view.right, view.up, view.forward].map(|a| a.to_array());
+            flow_center_m = view.centre_m.to_array();
+            let [width, height] = scene.film.size;
+            let all = Framing::fitted(width, height, full.sides_m());
+            whole_width_m = all.pixel_m * f64::from(width);
+        }
         self.serial += 1;
         let r = &rendered.report;
         let errors = self.errors_known(&Geometry::of(scene));
@@ -399,9 +415,15 @@ impl Worker {
             levels: r.levels,
             warnings: r.warnings.clone(),
             focal_length_m: scene.optics().schlieren_focal_length_m,
+            axes,
+            flow_center_m,
+            whole_width_m,
+            film_size: scene.film.size,
             ..info
         };
-        self.session.publish(Frame::new(info, Some(rendered), Some(&filter), Some(traced.clone())));
+        let traced = Some(traced.clone());
+        let frame = Frame::new(info, Some(rendered), Some(&filter), legend.as_ref(), traced);
+        self.session.publish(frame);
         Ok(())
     }
 
