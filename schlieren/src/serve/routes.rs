@@ -9,6 +9,7 @@
 //! | `POST /scene` | a change as JSON merge patch; `step` selects the time of a series |
 //! | `POST /paint` | [`Paint`] |
 //! | `POST /trace` | where the light of a point of the image crosses the filter |
+//! | `POST /profile` | deflections along a line on the image |
 //! | `GET /save/png`, `/save/exr`, `/save/toml` | downloads |
 
 use super::session::{Paint, RefusedChange, SaveKind, Session};
@@ -60,6 +61,7 @@ pub(super) fn router(session: Arc<Session>, token: &str) -> Router {
         .route("/{token}/scene", post(edit))
         .route("/{token}/paint", post(paint))
         .route("/{token}/trace", post(trace))
+        .route("/{token}/profile", post(profile))
         .route("/{token}/save/{kind}", get(save))
         .route("/{token}/{part}", get(part))
         .layer(DefaultBodyLimit::max(MAX_BODY_BYTES))
@@ -192,6 +194,24 @@ async fn trace(State(app): State<App>, body: Bytes) -> Response {
                 .into_response()
         }
         Ok(None) => axum::Json(serde_json::json!({ "dark": true })).into_response(),
+        Err(refused) => refused.into_response(),
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ProfileQuery {
+    from: [f64; 2],
+    to: [f64; 2],
+}
+
+async fn profile(State(app): State<App>, body: Bytes) -> Response {
+    let query: ProfileQuery = match json(&body) {
+        Ok(query) => query,
+        Err(response) => return *response,
+    };
+    match app.session.profile(query.from, query.to) {
+        Ok(profile) => axum::Json(profile).into_response(),
         Err(refused) => refused.into_response(),
     }
 }

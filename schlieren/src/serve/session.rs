@@ -6,6 +6,7 @@
 
 mod edit;
 mod paint;
+mod profile;
 #[cfg(test)]
 mod tests;
 
