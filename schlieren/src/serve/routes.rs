@@ -6,7 +6,8 @@
 //! | `GET /` and `GET /NAME` | the page and its files |
 //! | `GET /state` | scene, arrays, limits (JSON) |
 //! | `GET /frame?after=N` | the newest frame when its number is not N; waits, 204 on timeout |
-//! | `POST /scene` | a change as JSON merge patch; `step` selects the time of a series |
+//! | `POST /scene` | a change as JSON merge patch; beside the scene's sections, `step` selects the time of a series, `overlay` what is drawn on the image, and `fit` a frame of the flow's shape |
+//! | `POST /back` | returns to the last scene that was shown |
 //! | `POST /paint` | [`Paint`] |
 //! | `POST /trace` | where the light of a point of the image crosses the filter |
 //! | `POST /profile` | deflections along a line on the image |
@@ -62,6 +63,7 @@ pub(super) fn router(session: Arc<Session>, token: &str) -> Router {
         .route("/{token}/paint", post(paint))
         .route("/{token}/trace", post(trace))
         .route("/{token}/profile", post(profile))
+        .route("/{token}/back", post(back))
         .route("/{token}/save/{kind}", get(save))
         .route("/{token}/{part}", get(part))
         .layer(DefaultBodyLimit::max(MAX_BODY_BYTES))
@@ -212,6 +214,13 @@ async fn profile(State(app): State<App>, body: Bytes) -> Response {
     };
     match app.session.profile(query.from, query.to) {
         Ok(profile) => axum::Json(profile).into_response(),
+        Err(refused) => refused.into_response(),
+    }
+}
+
+async fn back(State(app): State<App>) -> Response {
+    match app.session.back() {
+        Ok(_) => axum::Json(app.session.state()).into_response(),
         Err(refused) => refused.into_response(),
     }
 }

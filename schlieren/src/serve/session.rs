@@ -5,6 +5,7 @@
 //! everything that takes time.
 
 mod edit;
+mod flow_change;
 mod paint;
 mod profile;
 #[cfg(test)]
@@ -14,9 +15,11 @@ pub use paint::{Canvas, Paint, PaintOutcome};
 
 use super::flow::ArrayInfo;
 use super::frame::Frame;
+use crate::drawing::Overlay;
 use crate::input::Step;
 use crate::scene::{CutoffSpec, FlowSpec, Scene, TechniqueSpec};
 use edit::{TechniqueSettings, check_limits};
+use glam::DVec3;
 use serde_json::Value;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -28,6 +31,8 @@ pub const MAX_SIDE: u32 = 2048;
 pub const MAX_SAMPLES: u32 = 4096;
 /// Largest number of strokes of a painting.
 pub const MAX_STROKES: usize = 5000;
+/// Largest number of nodes along the longest axis to which a page can resample.
+const MAX_NODES: usize = 320;
 /// Largest number of points of one request to paint.
 pub const MAX_POINTS: usize = 4096;
 
@@ -44,6 +49,8 @@ fn refused(text: impl Into<String>) -> RefusedChange {
 pub(super) struct Save {
     pub(super) scene: Scene,
     pub(super) kind: SaveKind,
+    /// What is drawn on the image for viewing.
+    pub(super) overlay: Option<Overlay>,
     /// Set when the request has ended.
     pub(super) cancel: Arc<AtomicBool>,
     pub(super) reply: tokio::sync::oneshot::Sender<Result<Vec<u8>, String>>,
@@ -65,6 +72,16 @@ pub(super) struct Shared {
     pub(super) saves: VecDeque<Save>,
     pub(super) frame: Option<Arc<Frame>>,
     pub(super) stop: bool,
+    /// What is drawn on the image.
+    pub(super) overlay: Option<Overlay>,
+    /// Whether the frame follows the flow's shape.
+    fitted: bool,
+    /// Size of the gas, once it is read.
+    size_m: Option<DVec3>,
+    /// The last scene that was shown, and what was drawn on it.
+    shown: Option<(Scene, Option<Overlay>)>,
+    /// The last flow whose index came from arrays, not from transfer functions.
+    medium: FlowSpec,
     settings: BTreeMap<&'static str, TechniqueSettings>,
     /// The scene's flow, and the n0 - 1 of the series that was found for it.
     pub(super) reference: Option<(FlowSpec, f64)>,
@@ -81,9 +98,9 @@ pub struct Session {
     pub(super) steps: Vec<Step>,
     /// Arrays of the first step, for transfer functions.
     arrays: Vec<ArrayInfo>,
-    /// The flow as the program started with it. A page may change neither files nor the meaning of
-    /// arrays, only curves.
-    flow: FlowSpec,
+    /// What the flow's quantities were called when the program started: arrays that are constant,
+    /// which `arrays` leaves out, among them.
+    given: Vec<String>,
     image: Option<CutoffSpec>,
 }
 
@@ -107,9 +124,16 @@ impl Session {
             saves: VecDeque::new(),
             frame: None,
             stop: false,
+            overlay: None,
+            fitted: false,
+            size_m: None,
+            shown: None,
+            medium: scene.flow.clone(),
             settings: BTreeMap::new(),
             reference: None,
         };
+        let f = scene.flow;
+        let given = [f.density, f.temperature, f.pressure, f.n_minus_1];
         Ok(Session {
             shared: Mutex::new(shared),
             wake: Condvar::new(),
@@ -117,9 +141,16 @@ impl Session {
             frames: tokio::sync::watch::channel(0).0,
             steps,
             arrays,
-            flow: scene.flow,
+            given: given.into_iter().flatten().collect(),
             image,
         })
+    }
+
+    /// Lets the frame follow the flow's shape.
+    #[must_use]
+    pub(super) fn fitted(self, fit: bool) -> Session {
+        self.lock().fitted = fit;
+        self
     }
 
     pub(super) fn lock(&self) -> MutexGuard<'_, Shared> {
@@ -139,9 +170,16 @@ impl Session {
             "times": self.steps.iter().map(|s| s.time).collect::<Vec<_>>(),
             "step": self.steps.iter().position(|s| s.path == scene.flow.file),
             "arrays": self.arrays,
+            "overlay": shared.overlay.map(|o| o.style),
+            "fit": shared.fitted,
             "techniques": TechniqueSpec::NAMES,
             "image_filter": self.image,
-            "limits": { "side": MAX_SIDE, "samples": MAX_SAMPLES, "strokes": MAX_STROKES },
+            "limits": {
+                "side": MAX_SIDE,
+                "samples": MAX_SAMPLES,
+                "strokes": MAX_STROKES,
+                "nodes": MAX_NODES,
+            },
         })
     }
 
@@ -191,8 +229,8 @@ impl Session {
             )));
         }
         let (reply, receiver) = tokio::sync::oneshot::channel();
-        let scene = shared.scene.clone();
-        shared.saves.push_back(Save { scene, kind, cancel, reply });
+        let (scene, overlay) = (shared.scene.clone(), shared.overlay);
+        shared.saves.push_back(Save { scene, kind, overlay, cancel, reply });
         drop(shared);
         self.cancel.store(true, Ordering::Relaxed);
         self.wake.notify_all();
@@ -215,7 +253,12 @@ impl Session {
     /// Makes a frame the newest one and notifies all waiting requests.
     pub(super) fn publish(&self, frame: Frame) {
         let serial = frame.info.serial;
-        self.lock().frame = Some(Arc::new(frame));
+        let mut shared = self.lock();
+        if frame.info.error.is_none() && frame.info.generation == shared.generation {
+            shared.shown = Some((shared.scene.clone(), shared.overlay));
+        }
+        shared.frame = Some(Arc::new(frame));
+        drop(shared);
         self.frames.send_replace(serial);
     }
 

@@ -133,12 +133,13 @@ impl Worker {
             session.cancel.store(false, Ordering::Relaxed);
             let save = shared.saves.pop_front();
             let (scene, generation) = (shared.scene.clone(), shared.generation);
+            let overlay = shared.overlay;
             drop(shared);
 
             match save {
                 Some(save) => self.save(save),
                 None => {
-                    if self.draw(&scene, generation) {
+                    if self.draw(&scene, overlay, generation) {
                         finished = generation;
                     }
                 }
@@ -147,10 +148,11 @@ impl Worker {
     }
 
     /// Renders all images of a scene. False when stopped before the last.
-    fn draw(&mut self, scene: &Scene, generation: u64) -> bool {
+    fn draw(&mut self, scene: &Scene, overlay: Option<Overlay>, generation: u64) -> bool {
         let session = self.session.clone();
         // A panic must not leave the page waiting forever.
-        let outcome = catch_unwind(AssertUnwindSafe(|| self.draw_levels(scene, generation)));
+        let outcome =
+            catch_unwind(AssertUnwindSafe(|| self.draw_levels(scene, overlay, generation)));
         let error = match outcome {
             Ok(Ok(done)) => return done,
             Ok(Err(RenderError::Cancelled)) => return false,
@@ -177,8 +179,17 @@ impl Worker {
         true
     }
 
-    fn draw_levels(&mut self, scene: &Scene, generation: u64) -> Result<bool, RenderError> {
+    fn draw_levels(
+        &mut self,
+        scene: &Scene,
+        overlay: Option<Overlay>,
+        generation: u64,
+    ) -> Result<bool, RenderError> {
         self.prepare(scene)?;
+        if self.session.lock().scene.film.size != scene.film.size {
+            // The frame has just been fitted to the flow.
+            return Ok(false);
+        }
         let dots = self.with_section(false, |s| dots(scene, s))?;
         let levels = levels(scene, self.interactive_side).into_iter().map(|l| l.with_dots(&dots));
         let levels: Vec<Level> = levels.collect();
@@ -187,7 +198,7 @@ impl Worker {
         let mut last_frame = None;
         for (i, level) in levels.into_iter().enumerate() {
             let start = Instant::now();
-            let rendered = self.render(&level)?;
+            let rendered = self.render(&level, overlay)?;
             let elapsed_secs = start.elapsed().as_secs_f64();
             if i == 0 && last > 0 {
                 self.adapt(elapsed_secs, scene);
@@ -258,6 +269,8 @@ impl Worker {
                 None => None,
             };
             full.solids = self.solids.take();
+            full.warnings.extend(no_outside(scene, &full));
+            self.session.found_size(full.size_m());
             let (flow, wavelengths_nm) = (scene.flow.clone(), scene.light.wavelengths_nm.clone());
             self.section = Some(Section { flow, wavelengths_nm, full, coarse });
         }
@@ -310,15 +323,28 @@ impl Worker {
         }
     }
 
-    fn render(&mut self, level: &Level) -> Result<RenderOutput, RenderError> {
+    /// Renders a level. Vectors are drawn when the image is no draft, as `schlieren render` draws
+    /// them: on a coarse image arrows would jump.
+    fn render(
+        &mut self,
+        level: &Level,
+        overlay: Option<Overlay>,
+    ) -> Result<RenderOutput, RenderError> {
         static NEVER: AtomicBool = AtomicBool::new(false);
         let session = self.session.clone();
         let control = Control {
             cancel: if level.stoppable { &session.cancel } else { &NEVER },
             progress: &|_| {},
         };
-        let layers = Layers { noise: true, accuracy: !level.draft, ..Layers::NONE };
-        self.with_section(level.coarse, |s| render::render(&level.scene, s, layers, &control))?
+        let overlay = overlay.filter(|_| !level.draft);
+        let layers =
+            Layers { noise: true, accuracy: !level.draft, map: overlay.is_some(), ..Layers::NONE };
+        let mut rendered = self
+            .with_section(level.coarse, |s| render::render(&level.scene, s, layers, &control))??;
+        if let Some(overlay) = overlay {
+            draw_on(&mut rendered, overlay);
+        }
+        Ok(rendered)
     }
 
     /// Deflections of the scene itself where they are known, otherwise of this level.
@@ -434,4 +460,22 @@ impl Worker {
         let side = f64::from(self.interactive_side) * factor;
         self.interactive_side = (side as u32).min(largest).max(INTERACTIVE_SIDES[1]);
     }
+}
+
+/// Draws vectors on a rendered image, where it has a map.
+fn draw_on(rendered: &mut RenderOutput, overlay: Overlay) {
+    let Some(map) = &rendered.map else { return };
+    let [width, height] = [rendered.framing.width, rendered.framing.height].map(|n| n as usize);
+    let mut canvas = Canvas { width, height, pixels: std::mem::take(&mut rendered.pixels) };
+    draw_overlay(&mut canvas, map, overlay);
+    rendered.pixels = canvas.pixels;
+    rendered.colored = true;
+}
+
+/// The warning about a choice for the outside of a mesh that nothing is outside of.
+fn no_outside(scene: &Scene, section: &TestSection) -> Option<String> {
+    let nothing = section.input.as_ref().is_some_and(|i| i.outside.is_none());
+    (nothing && scene.flow.outside != Outside::Auto).then(|| {
+        "flow.outside has no effect: no place of the lattice is outside the flow's mesh".to_owned()
+    })
 }

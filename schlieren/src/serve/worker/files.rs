@@ -1,6 +1,6 @@
 //! Writes the files that the page asks for.
 
-use super::Worker;
+use super::{Worker, draw_on};
 use crate::output;
 use crate::render::{self, Control, Layers};
 use crate::serve::session::{Save, SaveKind, chain};
@@ -22,22 +22,28 @@ impl Worker {
         self.prepare(&save.scene).map_err(|e| text(&e))?;
         let start = Instant::now();
         let layers = match save.kind {
-            SaveKind::Png => Layers::NONE,
             SaveKind::Exr => Layers::ALL,
+            // Measured as the shown image is, which may refine the march.
+            _ => Layers { map: save.overlay.is_some(), accuracy: true, ..Layers::NONE },
         };
         // A change of the scene does not stop a requested file; the end of its request or of the
         // program does.
         let control = Control { cancel: &save.cancel, progress: &|_| {} };
-        let rendered = self
+        let mut rendered = self
             .with_section(false, |s| render::render(&save.scene, s, layers, &control))
             .and_then(|r| r)
             .map_err(|e| text(&e))?;
         let folder = tempfile::tempdir().map_err(|e| text(&e))?;
         let path = folder.path().join("image");
         match save.kind {
-            SaveKind::Png => output::write_png(&path, &rendered).map(|_| ()),
             SaveKind::Exr => {
                 output::write_exr(&path, &rendered, &save.scene, start.elapsed().as_secs_f64())
+            }
+            _ => {
+                if let Some(overlay) = save.overlay {
+                    draw_on(&mut rendered, overlay);
+                }
+                output::write_png(&path, &rendered).map(|_| ())
             }
         }
         .map_err(|e| text(&e))?;
