@@ -11,7 +11,7 @@
 //! | `POST /paint` | [`Paint`] |
 //! | `POST /trace` | where the light of a point of the image crosses the filter |
 //! | `POST /profile` | deflections along a line on the image |
-//! | `GET /save/png`, `/save/exr`, `/save/toml` | downloads |
+//! | `GET /save/png`, `/save/exr`, `/save/toml`, `/save/sheet` | downloads |
 
 use super::session::{Paint, RefusedChange, SaveKind, Session};
 use axum::Router;
@@ -240,17 +240,22 @@ async fn save(State(app): State<App>, Path((_, kind)): Path<(String, String)>) -
             Ok(text) => (text.into_bytes(), "application/toml", "schlieren.toml"),
             Err(refused) => return refused.into_response(),
         },
-        "png" | "exr" => {
-            let kind = if kind == "png" { SaveKind::Png } else { SaveKind::Exr };
+        "png" | "exr" | "sheet" => {
+            let (kind, content, name) = match kind.as_str() {
+                "png" => (SaveKind::Png, "image/png", "schlieren.png"),
+                "exr" => (SaveKind::Exr, "image/x-exr", "schlieren.exr"),
+                _ => (SaveKind::Sheet, "image/png", "schlieren-sheet.png"),
+            };
+            if kind == SaveKind::Sheet
+                && let Some(refused) = app.session.sheet_refusal()
+            {
+                return refused.into_response();
+            }
             let cancel = Arc::new(AtomicBool::new(false));
             let _guard = StopsWhenDropped(cancel.clone());
             let receiver = match app.session.save(kind, cancel) {
                 Ok(receiver) => receiver,
                 Err(RefusedChange(text)) => return error(StatusCode::SERVICE_UNAVAILABLE, &text),
-            };
-            let (content, name) = match kind {
-                SaveKind::Png => ("image/png", "schlieren.png"),
-                SaveKind::Exr => ("image/x-exr", "schlieren.exr"),
             };
             match receiver.await {
                 Ok(Ok(bytes)) => (bytes, content, name),

@@ -63,6 +63,8 @@ pub(super) enum SaveKind {
     Png,
     /// The image with all layers.
     Exr,
+    /// The flow by all techniques.
+    Sheet,
 }
 
 pub(super) struct Shared {
@@ -213,6 +215,12 @@ impl Session {
     pub(super) fn is_later(&self, scene: &Scene) -> bool {
         scene.flow.reference_n_minus_1.is_none()
             && self.steps.first().is_some_and(|s| s.path != scene.flow.file)
+    }
+
+    /// Why the present scene has no sheet.
+    pub(super) fn sheet_refusal(&self) -> Option<RefusedChange> {
+        let cure = "choose one on the page, or use `schlieren render`";
+        crate::sheet::refusal(&self.lock().scene, cure).map(RefusedChange)
     }
 
     /// Requests a file. The receiver gets its bytes or the reason why there is none.

@@ -4,8 +4,12 @@ use super::{Worker, draw_on};
 use crate::output;
 use crate::render::{self, Control, Layers};
 use crate::serve::session::{Save, SaveKind, chain};
+use crate::sheet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Instant;
+
+/// Panels of a sheet in a row, as `schlieren sheet` has them.
+const COLUMNS: usize = 4;
 
 impl Worker {
     pub(super) fn save(&mut self, save: Save) {
@@ -20,6 +24,9 @@ impl Worker {
     fn file(&mut self, save: &Save) -> Result<Vec<u8>, String> {
         let text = |e: &dyn std::error::Error| chain(e);
         self.prepare(&save.scene).map_err(|e| text(&e))?;
+        if save.kind == SaveKind::Sheet {
+            return self.sheet(save);
+        }
         let start = Instant::now();
         let layers = match save.kind {
             SaveKind::Exr => Layers::ALL,
@@ -48,5 +55,26 @@ impl Worker {
         }
         .map_err(|e| text(&e))?;
         std::fs::read(&path).map_err(|e| text(&e))
+    }
+
+    /// The flow by all techniques, in the present view and frame.
+    fn sheet(&mut self, save: &Save) -> Result<Vec<u8>, String> {
+        let mut scene = sheet::scene_of_sheet(save.scene.clone());
+        let [w, h] = save.scene.film.size.map(f64::from);
+        let pixels = |n: f64| ((sheet::PANEL_SIDE * n / w.max(h)).round() as u32).max(16);
+        scene.film.size = [pixels(w), pixels(h)];
+        let control = Control { cancel: &save.cancel, progress: &|_| {} };
+        let sheet = self
+            .with_section(false, |s| sheet::render_sheet(&scene, s, &control))
+            .and_then(|s| s)
+            .map_err(|e| chain(&e))?;
+        if sheet.interrupted {
+            return Err("the sheet was interrupted".into());
+        }
+        let canvas = sheet::compose(&sheet, &sheet::title(&scene, &sheet), COLUMNS);
+        let folder = tempfile::tempdir().map_err(|e| chain(&e))?;
+        let path = folder.path().join("sheet");
+        output::write_canvas(&path, &canvas).map_err(|e| chain(&e))?;
+        std::fs::read(&path).map_err(|e| chain(&e))
     }
 }
