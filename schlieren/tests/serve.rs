@@ -27,6 +27,7 @@ fn the_page_and_its_parts_need_nothing_from_elsewhere() {
         "filter.js",
         "settings.js",
         "curves.js",
+        "rows.js",
     ] {
         let answer = s.get(part);
         assert_eq!(answer.status, 200, "{part}");

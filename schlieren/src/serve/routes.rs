@@ -33,13 +33,14 @@ const MAX_BODY_BYTES: usize = 2 * 1024 * 1024;
 const FRAME_TIMEOUT: Duration = Duration::from_secs(15);
 
 /// The page's files, embedded in the program.
-const ASSETS: [(&str, &str, &str); 8] = [
+const ASSETS: [(&str, &str, &str); 9] = [
     ("page.css", "text/css; charset=utf-8", include_str!("page/page.css")),
     ("main.js", JAVASCRIPT, include_str!("page/main.js")),
     ("server.js", JAVASCRIPT, include_str!("page/server.js")),
     ("units.js", JAVASCRIPT, include_str!("page/units.js")),
     ("image.js", JAVASCRIPT, include_str!("page/image.js")),
     ("filter.js", JAVASCRIPT, include_str!("page/filter.js")),
+    ("rows.js", JAVASCRIPT, include_str!("page/rows.js")),
     ("settings.js", JAVASCRIPT, include_str!("page/settings.js")),
     ("curves.js", JAVASCRIPT, include_str!("page/curves.js")),
 ];

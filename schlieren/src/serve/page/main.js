@@ -4,23 +4,25 @@ import * as server from "./server.js";
 import * as image from "./image.js";
 import * as filter from "./filter.js";
 import * as settings from "./settings.js";
+import * as rows from "./rows.js";
 import * as curves from "./curves.js";
 import { quantity, percent, linear } from "./units.js";
 
 const $ = id => document.getElementById(id);
-let state = null, info = null, angles = null, tool = "orbit", lostSince = null;
+let state = null, info = null, angles = null, tool = "orbit", lostSince = null, failed = false;
 
 // ---- From the program -------------------------------------------------------------------------------------------
 
 const AXES = { x: [0, 0], y: [-90, 0], z: [-90, 90] };
 
-function onState(next) {
+// With `all`, fields that have the focus are written too: what was refused goes back.
+function onState(next, all = false) {
   state = { ...next, half: filter.half() || 1e-3 };
   $("file").textContent = next.file || "";
   const direction = next.effective.view.direction;
   angles = AXES[direction] || direction.split(",").map(Number);
   showTime(next);
-  settings.show(state);
+  settings.show(state, all);
   curves.show(state);
   const paints = canPaint();
   filter.lock(!paints);
@@ -44,8 +46,17 @@ const canPaint = () => kind() === "schlieren";
 function onFrame(frame) {
   info = frame.info;
   $("progress").firstElementChild.style.width = info.finished ? "100%" : info.samples_wanted && !info.draft ? `${Math.round(10 + 80 * Math.log2(1 + info.samples) / Math.log2(1 + info.samples_wanted))}%` : "8%";
-  if (info.error) { say(info.error); $("done").textContent = "no image"; return; }
-  image.show(frame, state?.effective.film.size);
+  // Another page, or the flow's shape, has changed the scene.
+  if (state && info.generation > state.generation) server.refresh().catch(() => {});
+  if (info.error) {
+    failed = true;
+    say(info.error, false, { text: "go back", act: server.back });
+    $("done").textContent = "no image";
+    mark();
+    return;
+  }
+  if (failed) { failed = false; say(null); }
+  image.show(frame, info.film_size);
   filter.show(frame);
   if (state) state.half = filter.half();
   if (!$("radius").dataset.touched && info.filter_half_m) $("radius").value = Number((info.filter_half_m * 1e3 / 12).toPrecision(2));
@@ -65,8 +76,12 @@ function onFrame(frame) {
     ["light along", angles ? `azimuth ${Math.round(angles[0] * 10) / 10}°, elevation ${Math.round(angles[1] * 10) / 10}°` : "–"],
     ["march", info.march || "–"],
   ]);
-  $("warnings").replaceChildren(...(info.finished ? info.warnings : []).map(w => Object.assign(document.createElement("li"), { textContent: w })));
-  // For scripts that wait for a frame.
+  $("warnings").replaceChildren(...(info.finished ? info.warnings : []).map(w => Object.assign(document.createElement("li"), { textContent: inWords(w) })));
+  mark();
+}
+
+// For scripts that wait for a frame.
+function mark() {
   document.body.dataset.serial = info.serial;
   document.body.dataset.generation = info.generation;
   document.body.dataset.finished = info.finished;
@@ -80,10 +95,25 @@ function numbers(pairs) {
   }));
 }
 
-function say(text, note = false) {
+// What the library's warnings name by keys and options, in the words of the page.
+const WORDS = [
+  ["flow.resample_nodes, --resample", "“resample to”"],
+  ["flow.smoothing_nodes, --smoothing", "“smoothing”"],
+  ["march.tolerance_rad, --tolerance", "“tolerance”"],
+  ["flow.outside", "“outside the mesh”"],
+];
+const inWords = warning => WORDS.reduce((w, [key, label]) => w.replaceAll(key, label), warning);
+
+// A message, or none; `action` is a button beside it.
+function say(text, note = false, action = null) {
   const box = $("message");
   box.hidden = !text;
   box.textContent = text || "";
+  if (action) {
+    const button = Object.assign(document.createElement("button"), { textContent: action.text });
+    button.addEventListener("click", action.act);
+    box.append(button);
+  }
   box.classList.toggle("note", note);
 }
 
@@ -95,7 +125,7 @@ function onLost(lost) {
 // ---- To the program ---------------------------------------------------------------------------------------------
 
 server.listen(onState, say);
-settings.listen(server.change);
+rows.listen(server.change, say);
 curves.listen(server.change);
 
 function orbit(azimuth, elevation) {

@@ -30,13 +30,18 @@ export async function change(patch) {
     const next = waiting;
     waiting = null;
     try { onState(await call("scene", next)); onError(null); }
-    catch (e) { onError(e.message); try { onState(await call("state")); } catch { /* `frames` reports a lost connection */ } }
+    catch (e) { onError(e.message); try { onState(await call("state"), true); } catch { /* `frames` reports a lost connection */ } }
   }
   busy = false;
 }
 
 export const refresh = async () => onState(await call("state"));
 export const trace = at => call("trace", { at });
+
+// To the last scene that was shown.
+export async function back() {
+  try { onState(await call("back", {}), true); onError(null); } catch (e) { onError(e.message); }
+}
 
 // Strokes are sent one after the other, so that later ones cover earlier ones.
 let strokes = Promise.resolve();
@@ -56,7 +61,9 @@ function decode(buffer) {
   const take = n => { const bytes = new Uint8Array(buffer, at, n); at += n; return bytes; };
   const rgb = take(3 * info.width * info.height), n = info.filter_pixels * info.filter_pixels;
   const filter = take(3 * n);
-  return { info, rgb, filter, light: n ? new Float32Array(buffer.slice(at, at + 4 * n)) : new Float32Array(0) };
+  const light = new Float32Array(buffer.slice(at, at + 4 * n));
+  at += 4 * n;
+  return { info, rgb, filter, light, legend: take(3 * info.legend_pixels ** 2) };
 }
 
 export async function frames(show, lost) {
