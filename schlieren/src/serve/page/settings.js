@@ -1,6 +1,7 @@
 // The settings of the bench: what each technique has.
 
 import { choice, number, numbers, one, range, shower, text } from "./rows.js";
+import { ROWS, TECHNIQUES } from "./help.js";
 
 function cutoffRows(state) {
   const kinds = ["knife", "circle", "complemented-circle", "color", "painted"];
@@ -130,9 +131,10 @@ function shapeOf(state) {
 
 function rowsOf(state) {
   const technique = choice("technique", state.techniques, s => s.effective.technique.kind,
-    v => ({ technique: { kind: v } }));
-  return [technique, ...techniqueRows(state), ...lightRows(state),
+    v => ({ technique: { kind: v } }), { help: TECHNIQUES, list: true });
+  const about = { kind: "hint", get: s => TECHNIQUES[s.effective.technique.kind] };
+  return [technique, about, ...techniqueRows(state), ...lightRows(state),
     ...filmRows(state)];
 }
 
-export const show = shower(document.getElementById("technique"), {}, shapeOf, rowsOf);
+export const show = shower(document.getElementById("technique"), ROWS, shapeOf, rowsOf);
