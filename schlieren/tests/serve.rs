@@ -27,6 +27,7 @@ fn the_page_and_its_parts_need_nothing_from_elsewhere() {
         "filter.js",
         "settings.js",
         "curves.js",
+        "flow.js",
         "help.js",
         "rows.js",
     ] {

@@ -4,6 +4,7 @@ import * as server from "./server.js";
 import * as image from "./image.js";
 import * as filter from "./filter.js";
 import * as settings from "./settings.js";
+import * as flow from "./flow.js";
 import * as rows from "./rows.js";
 import * as curves from "./curves.js";
 import { quantity, percent, linear } from "./units.js";
@@ -23,6 +24,7 @@ function onState(next, all = false) {
   angles = AXES[direction] || direction.split(",").map(Number);
   showTime(next);
   settings.show(state, all);
+  flow.show(state, all);
   curves.show(state);
   const paints = canPaint();
   filter.lock(!paints);
