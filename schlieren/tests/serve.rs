@@ -28,6 +28,7 @@ fn the_page_and_its_parts_need_nothing_from_elsewhere() {
         "settings.js",
         "curves.js",
         "flow.js",
+        "axes.js",
         "help.js",
         "rows.js",
     ] {

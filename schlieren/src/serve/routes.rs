@@ -33,7 +33,7 @@ const MAX_BODY_BYTES: usize = 2 * 1024 * 1024;
 const FRAME_TIMEOUT: Duration = Duration::from_secs(15);
 
 /// The page's files, embedded in the program.
-const ASSETS: [(&str, &str, &str); 11] = [
+const ASSETS: [(&str, &str, &str); 12] = [
     ("page.css", "text/css; charset=utf-8", include_str!("page/page.css")),
     ("main.js", JAVASCRIPT, include_str!("page/main.js")),
     ("server.js", JAVASCRIPT, include_str!("page/server.js")),
@@ -44,6 +44,7 @@ const ASSETS: [(&str, &str, &str); 11] = [
     ("settings.js", JAVASCRIPT, include_str!("page/settings.js")),
     ("curves.js", JAVASCRIPT, include_str!("page/curves.js")),
     ("flow.js", JAVASCRIPT, include_str!("page/flow.js")),
+    ("axes.js", JAVASCRIPT, include_str!("page/axes.js")),
     ("help.js", JAVASCRIPT, include_str!("page/help.js")),
 ];
 const JAVASCRIPT: &str = "text/javascript; charset=utf-8";

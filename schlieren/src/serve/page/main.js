@@ -5,6 +5,7 @@ import * as image from "./image.js";
 import * as filter from "./filter.js";
 import * as settings from "./settings.js";
 import * as flow from "./flow.js";
+import * as axes from "./axes.js";
 import * as rows from "./rows.js";
 import * as curves from "./curves.js";
 import { quantity, percent, linear } from "./units.js";
@@ -19,6 +20,7 @@ const AXES = { x: [0, 0], y: [-90, 0], z: [-90, 90] };
 // With `all`, fields that have the focus are written too: what was refused goes back.
 function onState(next, all = false) {
   state = { ...next, half: filter.half() || 1e-3 };
+  if (all) wanted = null;
   $("file").textContent = next.file || "";
   const direction = next.effective.view.direction;
   angles = AXES[direction] || direction.split(",").map(Number);
@@ -58,8 +60,10 @@ function onFrame(frame) {
     return;
   }
   if (failed) { failed = false; say(null); }
+  if (info.generation === state?.generation) wanted = null;
   image.show(frame, info.film_size);
   filter.show(frame);
+  axes.show(info);
   if (state) state.half = filter.half();
   if (!$("radius").dataset.touched && info.filter_half_m) $("radius").value = Number((info.filter_half_m * 1e3 / 12).toPrecision(2));
   const rate = info.rays / info.elapsed_secs;
@@ -127,7 +131,10 @@ function onLost(lost) {
 // ---- To the program ---------------------------------------------------------------------------------------------
 
 server.listen(onState, say);
-rows.listen(server.change, say);
+rows.listen(patch => {
+  if (patch.fit === false || patch.film?.size) fits = false;
+  server.change(patch);
+}, say);
 curves.listen(server.change);
 
 function orbit(azimuth, elevation) {
@@ -136,21 +143,73 @@ function orbit(azimuth, elevation) {
   server.change({ view: { direction: `${angles[0]},${angles[1]}` } });
 }
 
+// A frame that follows the flow is fitted when a turn ends, because it would jump during one.
+const turned = () => { if (state?.fit) server.change({ fit: true }); };
+
+// ---- The frame
+
+// The frame that was asked for and is not shown yet: width in metres and middle. `fits` is whether
+// the frame followed the flow before it was zoomed.
+let wanted = null, fits = false;
+
+function frameNow() {
+  if (wanted) return wanted;
+  fits ||= state?.fit ?? false;
+  return { width_m: info.pixel_m * info.width, center_m: info.center_m };
+}
+
+function setFrame(next) {
+  wanted = next;
+  const digits = v => Number(v.toPrecision(6));
+  server.change({ film: { field_of_view_m: digits(next.width_m), center_m: next.center_m.map(digits) } });
+}
+
+const sides = ({ width_m }) => [width_m, width_m * info.height / info.width];
+
+// The point under the pointer stays where it is.
+function zoom(factor, at) {
+  if (!info?.width) return;
+  const now = frameNow(), width_m = now.width_m * factor;
+  // Beyond the whole flow there is nothing, and far inside of it no more to see than a cell.
+  if (factor > 1 && width_m >= info.whole_width_m) { whole(); return; }
+  if (factor < 1 && width_m < 1e-3 * info.whole_width_m) return;
+  const [w, h] = sides(now), from = [(at[0] - 0.5) * w, (0.5 - at[1]) * h];
+  setFrame({ width_m, center_m: now.center_m.map((c, i) => c + from[i] * (1 - factor)) });
+}
+
+function pan() {
+  if (!info?.width) return () => {};
+  const start = frameNow(), [w, h] = sides(start);
+  const moved = (dx, dy) => [start.center_m[0] - dx * w, start.center_m[1] + dy * h];
+  return (dx, dy) => setFrame({ width_m: start.width_m, center_m: moved(dx, dy) });
+}
+
+function whole() {
+  wanted = null;
+  const same = fits || state?.fit;
+  server.change(same ? { fit: true } : { film: { field_of_view_m: null, center_m: [0, 0] } });
+}
+
+// ---- Tools
+
 const radius = () => Math.max(1e-9, Number($("radius").value) / 1e3 || 0);
 const paint = on => points => server.paint({ on, points, radius_m: radius(), rgb: linear($("color").value) });
 
 image.interact({
-  angles: () => angles || [0, 0], orbit, paints: () => tool === "paint" && canPaint(), paint: paint("picture"), trace: server.trace, mark: filter.point,
+  angles: () => angles || [0, 0], orbit, turned, tool: () => tool, paint: paint("picture"),
+  zoom, pan, whole, trace: server.trace,
+  mark: filter.point,
 });
 filter.interact({ paints: canPaint, radius, paint: paint("filter") });
 
 function setTool(next) {
   tool = next;
   document.querySelector(`input[name=tool][value=${next}]`).checked = true;
-  image.setPainting(next === "paint");
+  image.setTool(next);
 }
 for (const input of document.querySelectorAll("input[name=tool]")) input.addEventListener("change", () => setTool(input.value));
-for (const button of document.querySelectorAll("[data-view]")) button.addEventListener("click", () => server.change({ view: { direction: button.dataset.view } }));
+for (const button of document.querySelectorAll("[data-view]")) button.addEventListener("click", () => server.change({ view: { direction: button.dataset.view }, ...(state?.fit ? { fit: true } : {}) }));
+$("whole").addEventListener("click", whole);
 $("step").addEventListener("input", () => server.change({ step: Number($("step").value) }));
 $("radius").addEventListener("input", () => { $("radius").dataset.touched = "1"; });
 

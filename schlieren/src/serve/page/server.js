@@ -22,7 +22,15 @@ async function call(path, body) {
   return answer;
 }
 
+// The frame is chosen or fitted: the later wish counts.
+function choose(patch) {
+  const keys = ["size", "field_of_view_m", "center_m"], film = waiting?.film;
+  if (patch.fit && film) for (const key of keys) delete film[key];
+  if (waiting && keys.some(key => patch.film && key in patch.film)) delete waiting.fit;
+}
+
 export async function change(patch) {
+  choose(patch);
   waiting = waiting ? merge(waiting, patch) : structuredClone(patch);
   if (busy) return;
   busy = true;

@@ -1,6 +1,6 @@
 // The settings of the bench: what each technique has.
 
-import { choice, number, numbers, one, range, shower, text } from "./rows.js";
+import { check, choice, number, numbers, one, range, shower, text } from "./rows.js";
 import { ROWS, TECHNIQUES } from "./help.js";
 
 function cutoffRows(state) {
@@ -102,6 +102,7 @@ function lightRows(state) {
 function filmRows(state) {
   const e = s => s.effective, film = s => e(s).film, rows = [];
   rows.push(text("pixels", "", s => film(s).size.join(" × "), v => ({ film: { size: numbers("pixels", v) } })));
+  rows.push(check("fit the flow", s => s.fit, v => ({ fit: v })));
   rows.push(number("field of view", "mm", 1e3, s => film(s).field_of_view_m, v => ({ film: { field_of_view_m: v } }), { empty: "all" }));
   rows.push(number("exposure", "×", 1, s => film(s).exposure, v => ({ film: { exposure: v } })));
   const sampling = e(state).sampling;
