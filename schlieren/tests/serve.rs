@@ -29,6 +29,7 @@ fn the_page_and_its_parts_need_nothing_from_elsewhere() {
         "curves.js",
         "flow.js",
         "axes.js",
+        "legend.js",
         "help.js",
         "rows.js",
     ] {

@@ -33,7 +33,7 @@ const MAX_BODY_BYTES: usize = 2 * 1024 * 1024;
 const FRAME_TIMEOUT: Duration = Duration::from_secs(15);
 
 /// The page's files, embedded in the program.
-const ASSETS: [(&str, &str, &str); 12] = [
+const ASSETS: [(&str, &str, &str); 13] = [
     ("page.css", "text/css; charset=utf-8", include_str!("page/page.css")),
     ("main.js", JAVASCRIPT, include_str!("page/main.js")),
     ("server.js", JAVASCRIPT, include_str!("page/server.js")),
@@ -45,6 +45,7 @@ const ASSETS: [(&str, &str, &str); 12] = [
     ("curves.js", JAVASCRIPT, include_str!("page/curves.js")),
     ("flow.js", JAVASCRIPT, include_str!("page/flow.js")),
     ("axes.js", JAVASCRIPT, include_str!("page/axes.js")),
+    ("legend.js", JAVASCRIPT, include_str!("page/legend.js")),
     ("help.js", JAVASCRIPT, include_str!("page/help.js")),
 ];
 const JAVASCRIPT: &str = "text/javascript; charset=utf-8";

@@ -6,6 +6,7 @@ import * as filter from "./filter.js";
 import * as settings from "./settings.js";
 import * as flow from "./flow.js";
 import * as axes from "./axes.js";
+import * as legend from "./legend.js";
 import * as rows from "./rows.js";
 import * as curves from "./curves.js";
 import { quantity, percent, linear } from "./units.js";
@@ -64,6 +65,7 @@ function onFrame(frame) {
   image.show(frame, info.film_size);
   filter.show(frame);
   axes.show(info);
+  legend.show(frame, state?.effective);
   if (state) state.half = filter.half();
   if (!$("radius").dataset.touched && info.filter_half_m) $("radius").value = Number((info.filter_half_m * 1e3 / 12).toPrecision(2));
   const rate = info.rays / info.elapsed_secs;
@@ -198,7 +200,7 @@ const paint = on => points => server.paint({ on, points, radius_m: radius(), rgb
 image.interact({
   angles: () => angles || [0, 0], orbit, turned, tool: () => tool, paint: paint("picture"),
   zoom, pan, whole, trace: server.trace,
-  mark: filter.point,
+  mark: (at, deflection) => { filter.point(at); legend.point(deflection); },
 });
 filter.interact({ paints: canPaint, radius, paint: paint("filter") });
 
