@@ -30,6 +30,7 @@ fn the_page_and_its_parts_need_nothing_from_elsewhere() {
         "flow.js",
         "axes.js",
         "legend.js",
+        "profile.js",
         "help.js",
         "rows.js",
     ] {

@@ -7,6 +7,7 @@ import * as settings from "./settings.js";
 import * as flow from "./flow.js";
 import * as axes from "./axes.js";
 import * as legend from "./legend.js";
+import * as profile from "./profile.js";
 import * as rows from "./rows.js";
 import * as curves from "./curves.js";
 import { quantity, percent, linear } from "./units.js";
@@ -66,6 +67,7 @@ function onFrame(frame) {
   filter.show(frame);
   axes.show(info);
   legend.show(frame, state?.effective);
+  profile.showFrame(frame);
   if (state) state.half = filter.half();
   if (!$("radius").dataset.touched && info.filter_half_m) $("radius").value = Number((info.filter_half_m * 1e3 / 12).toPrecision(2));
   const rate = info.rays / info.elapsed_secs;
@@ -137,6 +139,7 @@ rows.listen(patch => {
   if (patch.fit === false || patch.film?.size) fits = false;
   server.change(patch);
 }, say);
+profile.listen(say);
 curves.listen(server.change);
 
 function orbit(azimuth, elevation) {
@@ -199,7 +202,7 @@ const paint = on => points => server.paint({ on, points, radius_m: radius(), rgb
 
 image.interact({
   angles: () => angles || [0, 0], orbit, turned, tool: () => tool, paint: paint("picture"),
-  zoom, pan, whole, trace: server.trace,
+  line: profile.setLine, moveLine: profile.move, zoom, pan, whole, trace: server.trace,
   mark: (at, deflection) => { filter.point(at); legend.point(deflection); },
 });
 filter.interact({ paints: canPaint, radius, paint: paint("filter") });
@@ -208,6 +211,7 @@ function setTool(next) {
   tool = next;
   document.querySelector(`input[name=tool][value=${next}]`).checked = true;
   image.setTool(next);
+  profile.setActive(next === "profile");
 }
 for (const input of document.querySelectorAll("input[name=tool]")) input.addEventListener("change", () => setTool(input.value));
 for (const button of document.querySelectorAll("[data-view]")) button.addEventListener("click", () => server.change({ view: { direction: button.dataset.view }, ...(state?.fit ? { fit: true } : {}) }));

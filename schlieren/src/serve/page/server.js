@@ -45,6 +45,7 @@ export async function change(patch) {
 
 export const refresh = async () => onState(await call("state"));
 export const trace = at => call("trace", { at });
+export const profile = (from, to) => call("profile", { from, to });
 
 // To the last scene that was shown.
 export async function back() {
