@@ -74,6 +74,13 @@ function techniqueRows(state) {
   }
 }
 
+// What is drawn over an image: how far dots move, or how light is bent.
+function vectorRows(state) {
+  if (["volume", "slice"].includes(state.effective.technique.kind)) return [];
+  return [choice("vectors", ["none", "arrows", "lic"], s => s.overlay ?? "none",
+    v => ({ overlay: v === "none" ? null : v }))];
+}
+
 function lightRows(state) {
   const e = s => s.effective, light = s => e(s).light, kind = e(state).technique.kind, rows = [];
   const source = light(state).source;
@@ -134,7 +141,7 @@ function rowsOf(state) {
   const technique = choice("technique", state.techniques, s => s.effective.technique.kind,
     v => ({ technique: { kind: v } }), { help: TECHNIQUES, list: true });
   const about = { kind: "hint", get: s => TECHNIQUES[s.effective.technique.kind] };
-  return [technique, about, ...techniqueRows(state), ...lightRows(state),
+  return [technique, about, ...techniqueRows(state), ...vectorRows(state), ...lightRows(state),
     ...filmRows(state)];
 }
 
