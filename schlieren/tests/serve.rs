@@ -33,6 +33,7 @@ fn the_page_and_its_parts_need_nothing_from_elsewhere() {
         "profile.js",
         "help.js",
         "rows.js",
+        "save.js",
     ] {
         let answer = s.get(part);
         assert_eq!(answer.status, 200, "{part}");

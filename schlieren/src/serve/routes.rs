@@ -33,7 +33,7 @@ const MAX_BODY_BYTES: usize = 2 * 1024 * 1024;
 const FRAME_TIMEOUT: Duration = Duration::from_secs(15);
 
 /// The page's files, embedded in the program.
-const ASSETS: [(&str, &str, &str); 14] = [
+const ASSETS: [(&str, &str, &str); 15] = [
     ("page.css", "text/css; charset=utf-8", include_str!("page/page.css")),
     ("main.js", JAVASCRIPT, include_str!("page/main.js")),
     ("server.js", JAVASCRIPT, include_str!("page/server.js")),
@@ -48,6 +48,7 @@ const ASSETS: [(&str, &str, &str); 14] = [
     ("legend.js", JAVASCRIPT, include_str!("page/legend.js")),
     ("profile.js", JAVASCRIPT, include_str!("page/profile.js")),
     ("help.js", JAVASCRIPT, include_str!("page/help.js")),
+    ("save.js", JAVASCRIPT, include_str!("page/save.js")),
 ];
 const JAVASCRIPT: &str = "text/javascript; charset=utf-8";
 const INDEX: &str = include_str!("page/index.html");

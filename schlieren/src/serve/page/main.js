@@ -9,6 +9,7 @@ import * as axes from "./axes.js";
 import * as legend from "./legend.js";
 import * as profile from "./profile.js";
 import * as rows from "./rows.js";
+import * as save from "./save.js";
 import * as curves from "./curves.js";
 import { quantity, percent, linear } from "./units.js";
 
@@ -140,6 +141,7 @@ rows.listen(patch => {
   server.change(patch);
 }, say);
 profile.listen(say);
+save.listen(say);
 curves.listen(server.change);
 
 function orbit(azimuth, elevation) {
