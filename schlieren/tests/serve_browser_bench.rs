@@ -198,6 +198,8 @@ fn vectors_are_drawn_and_files_are_kept() {
         wait_until_final(&mut b);
         let drawn = look(&mut b, style);
         assert!(differs(&bare, &drawn, image, [0.2, 0.1, 0.9, 0.9]) > 0.01, "{style}");
+        let words = b.evaluate("document.getElementById('legend-words').innerText").to_string();
+        assert!(words.contains("scale is in the lower left corner"), "{words}");
     }
     for (files, name) in
         [("png toml", "schlieren.png schlieren.toml"), ("sheet", "schlieren-sheet.png")]

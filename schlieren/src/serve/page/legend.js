@@ -64,6 +64,10 @@ const MEANING = {
   },
   interferogram: e => {
     const visibility = e.technique.visibility, nm = e.light.wavelengths_nm[0];
+    if (e.light.wavelengths_nm.length > 1) {
+      strip(v => v);
+      return ["with several wavelengths fringes have colours, and no legend"];
+    }
     strip(v => e.film.exposure * (0.5 + 0.5 * visibility * Math.cos(2 * Math.PI * v)));
     return [`optical path 0 to one wavelength (${short(nm)} nm); then it begins again`];
   },
@@ -72,14 +76,23 @@ const MEANING = {
   slice: () => { strip(v => v); return ["an illustration: its brightness has no unit"]; },
 };
 
-export function show(frame, effective) {
+// `vectors` is what is drawn over the image; its scale is in the picture.
+const VECTORS = {
+  arrows: "arrows: their scale is in the lower left corner of the picture",
+  lic: "colours are lengths of vectors: their scale is in the lower left corner of the picture",
+};
+
+export function show(frame, effective, vectors) {
   if (!effective || frame.info.draft) return;
-  const square_of = frame.info.legend_pixels > 0;
-  last = square_of ? frame : null;
+  // Lines along vectors replace the picture, and its colours with it.
+  const replaced = vectors === "lic", bos = effective.technique.kind === "bos";
+  const is_square = frame.info.legend_pixels > 0 && !replaced;
+  last = is_square ? frame : null;
   figure.hidden = false;
-  canvas.hidden = !square_of && effective.technique.kind === "bos";
+  canvas.hidden = replaced || bos;
   let lines;
-  if (square_of) {
+  if (replaced || (vectors && bos)) lines = [VECTORS[vectors]];
+  else if (is_square) {
     square(frame);
     lines = [`colour of each deflection, up to ${quantity(frame.info.legend_half_rad, "rad")} `
       + "to the right, left, up and down"];

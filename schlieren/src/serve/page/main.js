@@ -67,8 +67,8 @@ function onFrame(frame) {
   image.show(frame, info.film_size);
   filter.show(frame);
   axes.show(info);
-  legend.show(frame, state?.effective);
-  profile.showFrame(frame);
+  legend.show(frame, state?.effective, state?.overlay);
+  profile.showFrame(frame, state?.overlay);
   if (state) state.half = filter.half();
   if (!$("radius").dataset.touched && info.filter_half_m) $("radius").value = Number((info.filter_half_m * 1e3 / 12).toPrecision(2));
   const rate = info.rays / info.elapsed_secs;

@@ -15,6 +15,8 @@ const QUANTITIES = {
 };
 let line = { from: [0, 0.5], to: [1, 0.5] }, cursor = 0.5;
 let points = [], length_m = 0, frame = null, active = false, asking = false, again = false;
+// Whether vectors are drawn over the image's brightness.
+let covered = false;
 let report = () => {};
 
 export function listen(error) { report = error; }
@@ -26,10 +28,11 @@ export function setActive(on) {
   if (on) ask();
 }
 
-export function showFrame(next) {
+export function showFrame(next, vectors) {
   // Drafts have coarse deflections, and would make the curve jump.
   if (next.info.draft || !next.info.width) return;
   frame = next;
+  covered = Boolean(vectors);
   if (active) ask();
 }
 
@@ -50,7 +53,7 @@ export function move(dx, dy) {
 
 // Linear brightness at a point, of the channel that the eye weighs most.
 function light(at) {
-  if (!frame) return null;
+  if (!frame || covered) return null;
   const { width, height } = frame.info;
   const [x, y] = [Math.min(width - 1, Math.floor(at[0] * width)),
     Math.min(height - 1, Math.floor(at[1] * height))];
@@ -137,6 +140,10 @@ function read() {
   const p = points[Math.round(cursor * (points.length - 1))];
   if (!p) return;
   const { name, of, unit } = chosen(), value = of(p);
+  if (covered && unit !== "rad") {
+    $("profile-here").textContent = "the vectors cover the brightness; choose “vectors” none";
+    return;
+  }
   const shown = value === null ? "no light" : unit === "rad" ? quantity(value, unit, 4)
     : `${Number((100 * value).toPrecision(4))} % of white`;
   $("profile-here").textContent =
