@@ -27,6 +27,13 @@ fn the_page_and_its_parts_need_nothing_from_elsewhere() {
         "filter.js",
         "settings.js",
         "curves.js",
+        "flow.js",
+        "axes.js",
+        "legend.js",
+        "profile.js",
+        "help.js",
+        "rows.js",
+        "save.js",
     ] {
         let answer = s.get(part);
         assert_eq!(answer.status, 200, "{part}");

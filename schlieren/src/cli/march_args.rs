@@ -39,6 +39,10 @@ pub(super) struct FrameArgs {
 }
 
 impl FrameArgs {
+    pub(super) fn is_given(&self) -> bool {
+        self.size.is_some() || self.field_of_view.is_some()
+    }
+
     pub(super) fn apply(&self, s: &mut Scene) {
         s.film.size = self.size.unwrap_or(s.film.size);
         s.film.field_of_view_m = self.field_of_view.or(s.film.field_of_view_m);

@@ -152,6 +152,11 @@ fn no_effect(flag: &str, what: &str, name: &str, belongs: &str) -> UsageError {
 }
 
 impl SceneArgs {
+    /// Whether the options or the scene's file choose the frame.
+    pub(super) fn has_frame(&self) -> bool {
+        self.scene.is_some() || self.frame.is_given()
+    }
+
     /// The effective scene after validation.
     pub(super) fn scene(&self, file: Option<&std::path::Path>) -> anyhow::Result<Scene> {
         let mut s = match &self.scene {

@@ -66,9 +66,11 @@ pub(super) fn serve(common: CommonArgs, args: &ServeArgs) -> anyhow::Result<()> 
             args.listen
         ));
     }
+    // A square picture of a long flow is mostly empty.
+    let fit = !args.scene.has_frame();
     common.note(0, format_args!("reading {}", scene.flow.file.display()));
     let mut printed = Ok(());
-    let outcome = serve::serve(scene, steps, args.listen, cancel.flag(), |url| {
+    let outcome = serve::serve(scene, steps, fit, args.listen, cancel.flag(), |url| {
         printed = common.result(&json!({ "url": url }), || format!("open {url}"));
         common.note(0, "Ctrl-C ends the program");
     });

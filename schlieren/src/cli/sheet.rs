@@ -7,15 +7,12 @@ use crate::drawing::Canvas;
 use crate::output;
 use crate::render::{Control, RenderError, TestSection};
 use crate::scene::Scene;
-use crate::sheet::{Sheet, compose, render_sheet};
+use crate::sheet::{PANEL_SIDE, compose, refusal, render_sheet, scene_of_sheet, title};
 use clap::Args;
 use datasets::cli::{Cancel, CommonArgs, Interrupted, UsageError};
 use serde_json::json;
 use std::path::PathBuf;
 use std::time::Instant;
-
-/// Longest side of a panel, in pixels, unless --size says otherwise.
-const PANEL_SIDE: f64 = 320.0;
 
 /// Options of `schlieren sheet`.
 #[derive(Debug, Args)]
@@ -58,18 +55,7 @@ impl SheetArgs {
             Some(path) => Scene::open(path)?,
             None => Scene::default(),
         };
-        // What belongs to one technique is chosen for each panel.
-        let mut s = Scene {
-            flow: from.flow,
-            view: from.view,
-            march: from.march,
-            solids: from.solids,
-            media: from.media,
-            ..Scene::default()
-        };
-        s.film.field_of_view_m = from.film.field_of_view_m;
-        s.film.center_m = from.film.center_m;
-        s.light.wavelengths_nm = from.light.wavelengths_nm;
+        let mut s = scene_of_sheet(from);
         if let Some(file) = &self.file {
             s.flow.file.clone_from(file);
         }
@@ -80,20 +66,9 @@ impl SheetArgs {
         self.view.apply(&mut s);
         self.frame.apply(&mut s);
         self.march.apply(&mut s)?;
-        if s.media.emission.is_some() || s.media.rotation.is_some() {
-            return Err(UsageError(
-                "media.emission and media.rotation of the scene are not in the panels of a sheet; \
-                 omit them, or use `schlieren render`"
-                    .into(),
-            )
-            .into());
-        }
-        if s.light.wavelengths_nm.len() > 1 {
-            return Err(UsageError(
-                "a sheet is of one wavelength; give --wavelength one, or use `schlieren render`"
-                    .into(),
-            )
-            .into());
+        let cure = "give --wavelength one, or use `schlieren render`";
+        if let Some(text) = refusal(&s, cure) {
+            return Err(UsageError(text).into());
         }
         s.check().map_err(|e| match self.scene {
             None => UsageError(e.to_string()).into(),
@@ -183,15 +158,4 @@ pub(super) fn sheet(common: CommonArgs, args: &SheetArgs) -> anyhow::Result<()> 
         )
     })?;
     if sheet.interrupted { Err(Interrupted.into()) } else { Ok(()) }
-}
-
-/// The file, the view and the size of the picture.
-fn title(scene: &Scene, sheet: &Sheet) -> String {
-    let name = scene.flow.file.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let width_m = f64::from(sheet.framing.width) * sheet.framing.pixel_m;
-    format!(
-        "{name}, light along {}, {} wide",
-        scene.view.direction,
-        crate::drawing::in_unit(width_m, "m")
-    )
 }

@@ -34,15 +34,7 @@ pub(super) fn half_side_m(scene: &Scene, map: Option<&Map>) -> f64 {
     let optics = scene.optics();
     let image = optics.source_image();
     let source_m = image.half_extent_m([1.0, 0.0]).max(image.half_extent_m([0.0, 1.0]));
-    // Ignores the few rays that a shock deflects far: with them the rest of the light would shrink
-    // to a dot.
-    let mut sizes: Vec<f32> =
-        map.map_or(Vec::new(), |m| m.deflection_rad.iter().map(|d| d[0].hypot(d[1])).collect());
-    let mut deflection_rad = 0.0;
-    if !sizes.is_empty() {
-        let at = sizes.len() * 995 / 1000;
-        deflection_rad = f64::from(*sizes.select_nth_unstable_by(at, f32::total_cmp).1);
-    }
+    let deflection_rad = map.map_or(0.0, strong_deflection_rad);
     let light_m = source_m + optics.schlieren_focal_length_m * deflection_rad;
     let cutoff_m = match &scene.technique {
         TechniqueSpec::Schlieren { cutoff } => match cutoff {
@@ -57,9 +49,34 @@ pub(super) fn half_side_m(scene: &Scene, map: Option<&Map>) -> f64 {
         },
         _ => 0.0,
     };
-    let wanted = 1.15 * light_m.max(cutoff_m).max(1e-6);
-    let digit = 10f64.powf(wanted.log10().floor());
-    (wanted / digit).ceil() * digit
+    rounded_up(1.15 * light_m.max(cutoff_m).max(1e-6))
+}
+
+/// A positive number rounded up to one digit.
+fn rounded_up(value: f64) -> f64 {
+    let digit = 10f64.powf(value.log10().floor());
+    (value / digit).ceil() * digit
+}
+
+/// The deflection that all but few rays stay below. A shock deflects these far: with them the rest
+/// of the light would shrink to a dot.
+fn strong_deflection_rad(map: &Map) -> f64 {
+    let mut sizes: Vec<f32> = map.deflection_rad.iter().map(|d| d[0].hypot(d[1])).collect();
+    if sizes.is_empty() {
+        return 0.0;
+    }
+    let at = sizes.len() * 995 / 1000;
+    f64::from(*sizes.select_nth_unstable_by(at, f32::total_cmp).1)
+}
+
+/// The deflection up to which a legend shows colours: what the flow bends, and without a flow, what
+/// the filter plane shows.
+pub(super) fn legend_half_rad(scene: &Scene, map: &Map) -> f64 {
+    let strong_rad = strong_deflection_rad(map);
+    match strong_rad > 1e-12 {
+        true => rounded_up(1.15 * strong_rad),
+        false => half_side_m(scene, None) / scene.optics().schlieren_focal_length_m,
+    }
 }
 
 /// The cut-off plane with the scene's source; open for techniques without a cut-off.

@@ -1,6 +1,7 @@
 //! Packs a rendered image for the page: numbers as JSON, then pixels.
 
 use super::filter_plane::{FilterPlane, PIXELS};
+use super::legend::{self, Legend};
 use crate::film::Framing;
 use crate::render::{Map, RenderOutput};
 use rayon::prelude::*;
@@ -61,6 +62,20 @@ pub struct FrameInfo {
     pub focal_length_m: f64,
     /// Fraction of the light outside the shown filter plane.
     pub light_outside: f32,
+    /// Middle of the image, from the middle of the gas along right and up.
+    pub center_m: [f64; 2],
+    /// Pixels per row and rows of the final image.
+    pub film_size: [u32; 2],
+    /// Width of the image that shows all of the flow.
+    pub whole_width_m: f64,
+    /// Right, up and the direction of the light, in the flow's coordinates.
+    pub axes: [[f64; 3]; 3],
+    /// Middle of the gas in the flow's coordinates.
+    pub flow_center_m: [f64; 3],
+    /// Colours along each side of the legend of deflections; 0 without one.
+    pub legend_pixels: usize,
+    /// Deflection at the middle of each side of the legend.
+    pub legend_half_rad: f64,
 }
 
 /// The deflections of a view, for tracing pixels to the filter.
@@ -74,7 +89,8 @@ pub struct Frame {
     /// Numbers of the frame.
     pub info: FrameInfo,
     /// Head and pixels as sent, little-endian: length of the JSON as u32, the JSON, the image's
-    /// sRGB bytes, the filter's sRGB bytes, the light on the filter as f32.
+    /// sRGB bytes, the filter's sRGB bytes, the light on the filter as f32, the legend's sRGB
+    /// bytes.
     pub bytes: Vec<u8>,
     pub(super) traced: Option<Arc<DeflectionMap>>,
 }
@@ -85,12 +101,14 @@ impl Frame {
         mut info: FrameInfo,
         rendered: Option<&RenderOutput>,
         filter: Option<&FilterPlane>,
+        legend: Option<&Legend>,
         traced: Option<Arc<DeflectionMap>>,
     ) -> Frame {
         let mut pixels = Vec::new();
         if let Some(r) = rendered {
             (info.width, info.height, info.pixel_m) =
                 (r.framing.width, r.framing.height, r.framing.pixel_m);
+            info.center_m = r.framing.center_m;
             pixels.resize(3 * r.pixels.len(), 0);
             // The cast turns NaN into 0; the report has a warning about it.
             let byte = |v: f32| (255.0 * linear_to_srgb(v.clamp(0.0, 1.0))).round() as u8;
@@ -103,6 +121,9 @@ impl Frame {
             (info.filter_half_m, info.filter_pixels, info.light_outside) =
                 (f.half_m, PIXELS, f.outside);
         }
+        if let Some(l) = legend {
+            (info.legend_half_rad, info.legend_pixels) = (l.half_rad, legend::SIDE);
+        }
         let head = serde_json::to_vec(&info).unwrap_or_default();
         let mut bytes = (head.len() as u32).to_le_bytes().to_vec();
         bytes.extend(head);
@@ -111,6 +132,7 @@ impl Frame {
             bytes.extend(&f.rgb);
             bytes.extend(f.light.iter().flat_map(|v| v.to_le_bytes()));
         }
+        bytes.extend(legend.iter().flat_map(|l| &l.rgb));
         Frame { info, bytes, traced }
     }
 }

@@ -10,6 +10,7 @@
 mod filter_plane;
 mod flow;
 mod frame;
+mod legend;
 mod merge_patch;
 mod routes;
 mod session;
@@ -69,7 +70,8 @@ const POLL_INTERVAL: Duration = Duration::from_millis(50);
 const SHUTDOWN_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// Serves the scene until `cancel` is set. With several `steps` the page offers a choice of time
-/// and shows the first step first; otherwise it shows the scene's own file. `ready` is called with
+/// and shows the first step first; otherwise it shows the scene's own file. With `fit` the frame
+/// takes the flow's shape, and the scene's size only gives its longer side. `ready` is called with
 /// the address of the page once it can be opened.
 ///
 /// # Errors
@@ -78,6 +80,7 @@ const SHUTDOWN_TIMEOUT: Duration = Duration::from_secs(1);
 pub fn serve(
     mut scene: Scene,
     steps: Vec<Step>,
+    fit: bool,
     address: SocketAddr,
     cancel: &AtomicBool,
     ready: impl FnOnce(&str),
@@ -103,7 +106,7 @@ pub fn serve(
     if !scene.solids.files.is_empty() {
         solids = Some(Solids::open(&scene.solids.files).map_err(RenderError::from)?.0);
     }
-    let session = Arc::new(Session::new(scene, flow.arrays(), steps)?);
+    let session = Arc::new(Session::new(scene, flow.arrays(), steps)?.fitted(fit));
     let worker = worker::Worker::new(session.clone(), flow, solids);
     let thread = std::thread::Builder::new()
         .name("render".into())

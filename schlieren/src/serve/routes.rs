@@ -6,10 +6,12 @@
 //! | `GET /` and `GET /NAME` | the page and its files |
 //! | `GET /state` | scene, arrays, limits (JSON) |
 //! | `GET /frame?after=N` | the newest frame when its number is not N; waits, 204 on timeout |
-//! | `POST /scene` | a change as JSON merge patch; `step` selects the time of a series |
+//! | `POST /scene` | a change as JSON merge patch; beside the scene's sections, `step` selects the time of a series, `overlay` what is drawn on the image, and `fit` a frame of the flow's shape |
+//! | `POST /back` | returns to the last scene that was shown |
 //! | `POST /paint` | [`Paint`] |
 //! | `POST /trace` | where the light of a point of the image crosses the filter |
-//! | `GET /save/png`, `/save/exr`, `/save/toml` | downloads |
+//! | `POST /profile` | deflections along a line on the image |
+//! | `GET /save/png`, `/save/exr`, `/save/toml`, `/save/sheet` | downloads |
 
 use super::session::{Paint, RefusedChange, SaveKind, Session};
 use axum::Router;
@@ -31,15 +33,22 @@ const MAX_BODY_BYTES: usize = 2 * 1024 * 1024;
 const FRAME_TIMEOUT: Duration = Duration::from_secs(15);
 
 /// The page's files, embedded in the program.
-const ASSETS: [(&str, &str, &str); 8] = [
+const ASSETS: [(&str, &str, &str); 15] = [
     ("page.css", "text/css; charset=utf-8", include_str!("page/page.css")),
     ("main.js", JAVASCRIPT, include_str!("page/main.js")),
     ("server.js", JAVASCRIPT, include_str!("page/server.js")),
     ("units.js", JAVASCRIPT, include_str!("page/units.js")),
     ("image.js", JAVASCRIPT, include_str!("page/image.js")),
     ("filter.js", JAVASCRIPT, include_str!("page/filter.js")),
+    ("rows.js", JAVASCRIPT, include_str!("page/rows.js")),
     ("settings.js", JAVASCRIPT, include_str!("page/settings.js")),
     ("curves.js", JAVASCRIPT, include_str!("page/curves.js")),
+    ("flow.js", JAVASCRIPT, include_str!("page/flow.js")),
+    ("axes.js", JAVASCRIPT, include_str!("page/axes.js")),
+    ("legend.js", JAVASCRIPT, include_str!("page/legend.js")),
+    ("profile.js", JAVASCRIPT, include_str!("page/profile.js")),
+    ("help.js", JAVASCRIPT, include_str!("page/help.js")),
+    ("save.js", JAVASCRIPT, include_str!("page/save.js")),
 ];
 const JAVASCRIPT: &str = "text/javascript; charset=utf-8";
 const INDEX: &str = include_str!("page/index.html");
@@ -60,6 +69,8 @@ pub(super) fn router(session: Arc<Session>, token: &str) -> Router {
         .route("/{token}/scene", post(edit))
         .route("/{token}/paint", post(paint))
         .route("/{token}/trace", post(trace))
+        .route("/{token}/profile", post(profile))
+        .route("/{token}/back", post(back))
         .route("/{token}/save/{kind}", get(save))
         .route("/{token}/{part}", get(part))
         .layer(DefaultBodyLimit::max(MAX_BODY_BYTES))
@@ -196,6 +207,31 @@ async fn trace(State(app): State<App>, body: Bytes) -> Response {
     }
 }
 
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ProfileQuery {
+    from: [f64; 2],
+    to: [f64; 2],
+}
+
+async fn profile(State(app): State<App>, body: Bytes) -> Response {
+    let query: ProfileQuery = match json(&body) {
+        Ok(query) => query,
+        Err(response) => return *response,
+    };
+    match app.session.profile(query.from, query.to) {
+        Ok(profile) => axum::Json(profile).into_response(),
+        Err(refused) => refused.into_response(),
+    }
+}
+
+async fn back(State(app): State<App>) -> Response {
+    match app.session.back() {
+        Ok(_) => axum::Json(app.session.state()).into_response(),
+        Err(refused) => refused.into_response(),
+    }
+}
+
 /// Stops the rendering of a file when the request for it has ended.
 struct StopsWhenDropped(Arc<AtomicBool>);
 
@@ -211,17 +247,22 @@ async fn save(State(app): State<App>, Path((_, kind)): Path<(String, String)>) -
             Ok(text) => (text.into_bytes(), "application/toml", "schlieren.toml"),
             Err(refused) => return refused.into_response(),
         },
-        "png" | "exr" => {
-            let kind = if kind == "png" { SaveKind::Png } else { SaveKind::Exr };
+        "png" | "exr" | "sheet" => {
+            let (kind, content, name) = match kind.as_str() {
+                "png" => (SaveKind::Png, "image/png", "schlieren.png"),
+                "exr" => (SaveKind::Exr, "image/x-exr", "schlieren.exr"),
+                _ => (SaveKind::Sheet, "image/png", "schlieren-sheet.png"),
+            };
+            if kind == SaveKind::Sheet
+                && let Some(refused) = app.session.sheet_refusal()
+            {
+                return refused.into_response();
+            }
             let cancel = Arc::new(AtomicBool::new(false));
             let _guard = StopsWhenDropped(cancel.clone());
             let receiver = match app.session.save(kind, cancel) {
                 Ok(receiver) => receiver,
                 Err(RefusedChange(text)) => return error(StatusCode::SERVICE_UNAVAILABLE, &text),
-            };
-            let (content, name) = match kind {
-                SaveKind::Png => ("image/png", "schlieren.png"),
-                SaveKind::Exr => ("image/x-exr", "schlieren.exr"),
             };
             match receiver.await {
                 Ok(Ok(bytes)) => (bytes, content, name),

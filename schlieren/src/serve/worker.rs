@@ -12,15 +12,22 @@
 //! same scene. Because the number of photons grows by factors of four, this costs a third more than
 //! accumulation would.
 
-use super::filter_plane::FilterPlane;
+mod files;
+mod levels;
+
+use super::filter_plane::{FilterPlane, legend_half_rad};
 use super::flow::Flow;
 use super::frame::{DeflectionMap, Frame, FrameInfo};
-use super::session::{Save, SaveKind, Session, chain};
-use crate::output;
+use super::legend::Legend;
+use super::session::{Session, chain};
+use crate::drawing::{Canvas, Overlay, draw_overlay};
+use crate::film::Framing;
+use crate::input::Outside;
 use crate::path::PathQuantities;
 use crate::render::{self, Control, Layers, Map, RenderError, RenderOutput, TestSection, framing};
-use crate::scene::{FlowSpec, MarchSpec, SamplingSpec, Scene, TechniqueSpec, ViewSpec};
+use crate::scene::{FlowSpec, MarchSpec, Scene, ViewSpec};
 use crate::solids::Solids;
+use levels::{Level, dots, levels, wanted_samples};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -30,11 +37,6 @@ use std::time::{Duration, Instant};
 const INTERACTIVE_SECS: f64 = 0.06;
 /// Upper and lower limit of the longest side of that image.
 const INTERACTIVE_SIDES: [u32; 2] = [320, 64];
-/// Photons per pixel of that image.
-const INTERACTIVE_SAMPLES: u32 = 4;
-/// Tolerance of the first two images. It gives straight rays through all but the strongest flows,
-/// without a visible difference.
-const DRAFT_TOLERANCE_RAD: f64 = 1e-2;
 /// Time without a change before the error is measured, because measuring cannot be stopped.
 const IDLE_TIME: Duration = Duration::from_millis(500);
 
@@ -99,17 +101,6 @@ struct Section {
     coarse: Option<TestSection>,
 }
 
-/// One step of the progressive refinement.
-#[derive(Debug, Clone, PartialEq)]
-struct Level {
-    scene: Scene,
-    /// Whether it is rendered with a coarse tolerance.
-    draft: bool,
-    coarse: bool,
-    stoppable: bool,
-    samples: Option<u32>,
-}
-
 impl Worker {
     pub(super) fn new(session: Arc<Session>, flow: Flow, solids: Option<Solids>) -> Worker {
         Worker {
@@ -142,12 +133,13 @@ impl Worker {
             session.cancel.store(false, Ordering::Relaxed);
             let save = shared.saves.pop_front();
             let (scene, generation) = (shared.scene.clone(), shared.generation);
+            let overlay = shared.overlay;
             drop(shared);
 
             match save {
                 Some(save) => self.save(save),
                 None => {
-                    if self.draw(&scene, generation) {
+                    if self.draw(&scene, overlay, generation) {
                         finished = generation;
                     }
                 }
@@ -156,10 +148,11 @@ impl Worker {
     }
 
     /// Renders all images of a scene. False when stopped before the last.
-    fn draw(&mut self, scene: &Scene, generation: u64) -> bool {
+    fn draw(&mut self, scene: &Scene, overlay: Option<Overlay>, generation: u64) -> bool {
         let session = self.session.clone();
         // A panic must not leave the page waiting forever.
-        let outcome = catch_unwind(AssertUnwindSafe(|| self.draw_levels(scene, generation)));
+        let outcome =
+            catch_unwind(AssertUnwindSafe(|| self.draw_levels(scene, overlay, generation)));
         let error = match outcome {
             Ok(Ok(done)) => return done,
             Ok(Err(RenderError::Cancelled)) => return false,
@@ -182,12 +175,21 @@ impl Worker {
             error: Some(error),
             ..FrameInfo::default()
         };
-        session.publish(Frame::new(info, None, None, None));
+        session.publish(Frame::new(info, None, None, None, None));
         true
     }
 
-    fn draw_levels(&mut self, scene: &Scene, generation: u64) -> Result<bool, RenderError> {
+    fn draw_levels(
+        &mut self,
+        scene: &Scene,
+        overlay: Option<Overlay>,
+        generation: u64,
+    ) -> Result<bool, RenderError> {
         self.prepare(scene)?;
+        if self.session.lock().scene.film.size != scene.film.size {
+            // The frame has just been fitted to the flow.
+            return Ok(false);
+        }
         let dots = self.with_section(false, |s| dots(scene, s))?;
         let levels = levels(scene, self.interactive_side).into_iter().map(|l| l.with_dots(&dots));
         let levels: Vec<Level> = levels.collect();
@@ -196,7 +198,7 @@ impl Worker {
         let mut last_frame = None;
         for (i, level) in levels.into_iter().enumerate() {
             let start = Instant::now();
-            let rendered = self.render(&level)?;
+            let rendered = self.render(&level, overlay)?;
             let elapsed_secs = start.elapsed().as_secs_f64();
             if i == 0 && last > 0 {
                 self.adapt(elapsed_secs, scene);
@@ -267,6 +269,8 @@ impl Worker {
                 None => None,
             };
             full.solids = self.solids.take();
+            full.warnings.extend(no_outside(scene, &full));
+            self.session.found_size(full.size_m());
             let (flow, wavelengths_nm) = (scene.flow.clone(), scene.light.wavelengths_nm.clone());
             self.section = Some(Section { flow, wavelengths_nm, full, coarse });
         }
@@ -319,15 +323,28 @@ impl Worker {
         }
     }
 
-    fn render(&mut self, level: &Level) -> Result<RenderOutput, RenderError> {
+    /// Renders a level. Vectors are drawn when the image is no draft, as `schlieren render` draws
+    /// them: on a coarse image arrows would jump.
+    fn render(
+        &mut self,
+        level: &Level,
+        overlay: Option<Overlay>,
+    ) -> Result<RenderOutput, RenderError> {
         static NEVER: AtomicBool = AtomicBool::new(false);
         let session = self.session.clone();
         let control = Control {
             cancel: if level.stoppable { &session.cancel } else { &NEVER },
             progress: &|_| {},
         };
-        let layers = Layers { noise: true, accuracy: !level.draft, ..Layers::NONE };
-        self.with_section(level.coarse, |s| render::render(&level.scene, s, layers, &control))?
+        let overlay = overlay.filter(|_| !level.draft);
+        let layers =
+            Layers { noise: true, accuracy: !level.draft, map: overlay.is_some(), ..Layers::NONE };
+        let mut rendered = self
+            .with_section(level.coarse, |s| render::render(&level.scene, s, layers, &control))??;
+        if let Some(overlay) = overlay {
+            draw_on(&mut rendered, overlay);
+        }
+        Ok(rendered)
     }
 
     /// Deflections of the scene itself where they are known, otherwise of this level.
@@ -393,6 +410,18 @@ impl Worker {
         traced: &Arc<DeflectionMap>,
     ) -> Result<(), RenderError> {
         let filter = FilterPlane::new(scene, Some(&traced.map))?;
+        let half_rad = legend_half_rad(scene, &traced.map);
+        // Drafts keep the legend that is shown.
+        let legend = if info.draft { None } else { Legend::new(scene, half_rad)? };
+        let (mut axes, mut flow_center_m, mut whole_width_m) = ([[0.0; 3]; 3], [0.0; 3], 0.0);
+        if let Some(Section { full, .. }) = &self.section {
+            let view = &full.view;
+            axes = [view.right, view.up, view.forward].map(|a| a.to_array());
+            flow_center_m = view.centre_m.to_array();
+            let [width, height] = scene.film.size;
+            let all = Framing::fitted(width, height, full.sides_m());
+            whole_width_m = all.pixel_m * f64::from(width);
+        }
         self.serial += 1;
         let r = &rendered.report;
         let errors = self.errors_known(&Geometry::of(scene));
@@ -412,9 +441,15 @@ impl Worker {
             levels: r.levels,
             warnings: r.warnings.clone(),
             focal_length_m: scene.optics().schlieren_focal_length_m,
+            axes,
+            flow_center_m,
+            whole_width_m,
+            film_size: scene.film.size,
             ..info
         };
-        self.session.publish(Frame::new(info, Some(rendered), Some(&filter), Some(traced.clone())));
+        let traced = Some(traced.clone());
+        let frame = Frame::new(info, Some(rendered), Some(&filter), legend.as_ref(), traced);
+        self.session.publish(frame);
         Ok(())
     }
 
@@ -425,152 +460,22 @@ impl Worker {
         let side = f64::from(self.interactive_side) * factor;
         self.interactive_side = (side as u32).min(largest).max(INTERACTIVE_SIDES[1]);
     }
-
-    fn save(&mut self, save: Save) {
-        let outcome = catch_unwind(AssertUnwindSafe(|| self.file(&save)));
-        let result = outcome.unwrap_or_else(|_| {
-            Err("rendering this scene panicked; please report it with the saved scene".into())
-        });
-        // The request may have ended.
-        let _ = save.reply.send(result);
-    }
-
-    fn file(&mut self, save: &Save) -> Result<Vec<u8>, String> {
-        let text = |e: &dyn std::error::Error| chain(e);
-        self.prepare(&save.scene).map_err(|e| text(&e))?;
-        let start = Instant::now();
-        let layers = match save.kind {
-            SaveKind::Png => Layers::NONE,
-            SaveKind::Exr => Layers::ALL,
-        };
-        // A change of the scene does not stop a requested file; the end of its request or of the
-        // program does.
-        let control = Control { cancel: &save.cancel, progress: &|_| {} };
-        let rendered = self
-            .with_section(false, |s| render::render(&save.scene, s, layers, &control))
-            .and_then(|r| r)
-            .map_err(|e| text(&e))?;
-        let folder = tempfile::tempdir().map_err(|e| text(&e))?;
-        let path = folder.path().join("image");
-        match save.kind {
-            SaveKind::Png => output::write_png(&path, &rendered).map(|_| ()),
-            SaveKind::Exr => {
-                output::write_exr(&path, &rendered, &save.scene, start.elapsed().as_secs_f64())
-            }
-        }
-        .map_err(|e| text(&e))?;
-        std::fs::read(&path).map_err(|e| text(&e))
-    }
 }
 
-/// The background's dots in metres, where the scene leaves their size to the pixels: images with
-/// coarser pixels must have the same dots.
-fn dots(scene: &Scene, section: &TestSection) -> Option<TechniqueSpec> {
-    let TechniqueSpec::Bos { dot_diameter_m: None, dot_spacing_m, seed } = scene.technique else {
-        return None;
-    };
-    // The same choice as in [`render::technique`].
-    let diameter_m =
-        (3.0 * framing(scene, section).pixel_m).min(dot_spacing_m.unwrap_or(f64::INFINITY));
-    Some(TechniqueSpec::Bos {
-        dot_diameter_m: Some(diameter_m),
-        dot_spacing_m: Some(dot_spacing_m.unwrap_or(2.0 * diameter_m)),
-        seed,
+/// Draws vectors on a rendered image, where it has a map.
+fn draw_on(rendered: &mut RenderOutput, overlay: Overlay) {
+    let Some(map) = &rendered.map else { return };
+    let [width, height] = [rendered.framing.width, rendered.framing.height].map(|n| n as usize);
+    let mut canvas = Canvas { width, height, pixels: std::mem::take(&mut rendered.pixels) };
+    draw_overlay(&mut canvas, map, overlay);
+    rendered.pixels = canvas.pixels;
+    rendered.colored = true;
+}
+
+/// The warning about a choice for the outside of a mesh that nothing is outside of.
+fn no_outside(scene: &Scene, section: &TestSection) -> Option<String> {
+    let nothing = section.input.as_ref().is_some_and(|i| i.outside.is_none());
+    (nothing && scene.flow.outside != Outside::Auto).then(|| {
+        "flow.outside has no effect: no place of the lattice is outside the flow's mesh".to_owned()
     })
-}
-
-impl Level {
-    fn with_dots(mut self, dots: &Option<TechniqueSpec>) -> Level {
-        // The final image uses the scene unchanged.
-        if let Some(dots) = dots.as_ref().filter(|_| self.coarse) {
-            self.scene.technique = dots.clone();
-        }
-        self
-    }
-}
-
-fn wanted_samples(scene: &Scene) -> Option<u32> {
-    match scene.sampling() {
-        SamplingSpec::Photons { samples, .. } if scene.technique.follows_light() => Some(samples),
-        _ => None,
-    }
-}
-
-/// The steps of the progressive refinement; the last is the scene itself.
-fn levels(scene: &Scene, interactive_side: u32) -> Vec<Level> {
-    let wanted = wanted_samples(scene);
-    let whole = |samples: Option<u32>| {
-        let mut s = scene.clone();
-        if let (Some(n), SamplingSpec::Photons { jitter, seed, filter, .. }) =
-            (samples, scene.sampling())
-        {
-            s.sampling = Some(SamplingSpec::Photons { samples: n, jitter, seed, filter });
-        }
-        Level { scene: s, draft: false, coarse: false, stoppable: true, samples }
-    };
-    let mut draft = whole(wanted.map(|n| n.min(INTERACTIVE_SAMPLES)));
-    draft.scene.march.tolerance_rad = scene.march.tolerance_rad.max(DRAFT_TOLERANCE_RAD);
-    draft.draft = true;
-    let mut interactive = Level { coarse: true, stoppable: false, ..draft.clone() };
-    shrink(&mut interactive.scene, interactive_side);
-    let mut levels = vec![interactive, draft];
-    let mut samples = INTERACTIVE_SAMPLES;
-    while wanted.is_some_and(|w| samples < w) {
-        levels.push(whole(Some(samples)));
-        samples *= 4;
-    }
-    // The scene itself, unchanged.
-    levels.push(Level { scene: scene.clone(), ..whole(wanted) });
-    levels
-}
-
-/// Reduces the pixels of a scene.
-fn shrink(scene: &mut Scene, side: u32) {
-    let [w, h] = scene.film.size;
-    let longest = w.max(h);
-    if longest <= side {
-        return;
-    }
-    let factor = f64::from(side) / f64::from(longest);
-    scene.film.size = [w, h].map(|n| (f64::from(n) * factor).round().max(1.0) as u32);
-    if let SamplingSpec::Beams { cells_per_side } = scene.sampling()
-        && cells_per_side > 1
-    {
-        scene.sampling = Some(SamplingSpec::Beams { cells_per_side: 1 });
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn scene(rest: &str) -> Scene {
-        Scene::from_toml(&format!("[flow]\nfile = \"a\"\ndensity = \"r\"\n{rest}")).unwrap()
-    }
-
-    #[test]
-    fn images_get_finer_and_the_last_is_the_scene_itself() {
-        let s = scene("[film]\nsize = [512, 256]\n[sampling]\nmethod = \"photons\"\nsamples = 100");
-        let levels = levels(&s, 128);
-        let samples: Vec<_> = levels.iter().map(|l| l.samples.unwrap()).collect();
-        assert_eq!(samples, [4, 4, 4, 16, 64, 100]);
-        assert!(levels[0].draft && levels[1].draft && !levels[2].draft);
-        assert_eq!(levels[0].scene.film.size, [128, 64]);
-        assert!(levels[0].coarse && !levels[0].stoppable);
-        assert_eq!(levels.last().unwrap().scene, s);
-        for l in &levels {
-            l.scene.check().unwrap();
-        }
-    }
-
-    #[test]
-    fn every_technique_has_images_that_are_scenes() {
-        for name in TechniqueSpec::NAMES {
-            let s = scene(&format!("[technique]\nkind = \"{name}\""));
-            let levels = levels(&s, 100);
-            assert!(levels.len() >= 2, "{name}");
-            levels.iter().for_each(|l| l.scene.check().unwrap());
-            assert_eq!(levels.last().unwrap().scene, s);
-        }
-    }
 }

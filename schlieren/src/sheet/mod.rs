@@ -37,6 +37,9 @@
 mod bench;
 mod layout;
 mod panels;
+mod words;
+
+pub(crate) use words::{PANEL_SIDE, refusal, scene_of_sheet, title};
 
 pub use bench::PanelBench;
 pub use layout::compose;

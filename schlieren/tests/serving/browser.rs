@@ -1,5 +1,6 @@
 //! Drives a headless Chromium by its DevTools protocol: JSON over a WebSocket, with only the parts
-//! that the test needs.
+//! that the tests need.
+#![allow(dead_code, reason = "each test binary uses its part")]
 
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Read, Write};
@@ -140,6 +141,19 @@ impl Browser {
         event("mousePressed", points[0], 1);
         points[1..].iter().for_each(|p| event("mouseMoved", *p, 1));
         event("mouseReleased", points[points.len() - 1], 0);
+    }
+
+    /// Moves the mouse without a button.
+    pub(crate) fn hover(&mut self, at: [f64; 2]) {
+        let params = json!({"type": "mouseMoved", "x": at[0], "y": at[1]});
+        self.call("Input.dispatchMouseEvent", params);
+    }
+
+    /// Turns the mouse's wheel; upwards is negative.
+    pub(crate) fn wheel(&mut self, at: [f64; 2], down_px: f64) {
+        let params =
+            json!({"type": "mouseWheel", "x": at[0], "y": at[1], "deltaX": 0, "deltaY": down_px});
+        self.call("Input.dispatchMouseEvent", params);
     }
 
     /// A screenshot of the window as PNG.

@@ -76,6 +76,14 @@ impl Server {
         Server::of(&path, dir, options)
     }
 
+    /// The flow with its arrays under other meanings than the density.
+    pub(crate) fn start_with(medium: &[&str], options: &[&str]) -> Server {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("flow.vti");
+        flow(&path);
+        Server::as_medium(&path, dir, medium, options)
+    }
+
     /// A series of four times in which the blob moves to the left. The file of the third is
     /// missing.
     pub(crate) fn start_series(options: &[&str]) -> Server {
@@ -99,8 +107,13 @@ impl Server {
     }
 
     fn of(path: &Path, dir: tempfile::TempDir, options: &[&str]) -> Server {
+        Server::as_medium(path, dir, &["--density", "rho"], options)
+    }
+
+    fn as_medium(path: &Path, dir: tempfile::TempDir, medium: &[&str], options: &[&str]) -> Server {
         let mut child = Command::new(env!("CARGO_BIN_EXE_schlieren"))
-            .args(["serve", path.to_str().unwrap(), "--density", "rho", "--json"])
+            .args(["serve", path.to_str().unwrap(), "--json"])
+            .args(medium)
             .args(options)
             .stdout(Stdio::piped())
             .spawn()
@@ -195,6 +208,8 @@ pub(crate) struct DecodedFrame {
     pub(crate) rgb: Vec<u8>,
     pub(crate) filter: Vec<u8>,
     pub(crate) light: Vec<f32>,
+    /// Colours of deflections.
+    pub(crate) legend: Vec<u8>,
 }
 
 impl DecodedFrame {
@@ -204,12 +219,15 @@ impl DecodedFrame {
         let size = |key: &str| info[key].as_u64().unwrap() as usize;
         let (n, m) = (3 * size("width") * size("height"), size("filter_pixels").pow(2));
         let rest = &bytes[4 + length..];
-        assert_eq!(rest.len(), n + 3 * m + 4 * m, "{info}");
-        let light = rest[n + 3 * m..]
+        let before = n + 3 * m + 4 * m;
+        assert_eq!(rest.len(), before + 3 * size("legend_pixels").pow(2), "{info}");
+        let light = rest[n + 3 * m..before]
             .chunks_exact(4)
             .map(|b| f32::from_le_bytes(b.try_into().unwrap()))
             .collect();
-        DecodedFrame { rgb: rest[..n].to_vec(), filter: rest[n..n + 3 * m].to_vec(), light, info }
+        let legend = rest[before..].to_vec();
+        let (rgb, filter) = (rest[..n].to_vec(), rest[n..n + 3 * m].to_vec());
+        DecodedFrame { rgb, filter, light, legend, info }
     }
 }
 

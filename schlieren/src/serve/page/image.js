@@ -1,10 +1,13 @@
-// The image: shows frames, orbits, paints, and shows the deflection under the pointer.
+// The image: shows frames, orbits, zooms, paints, and shows the deflection under the pointer.
 
+import { place as placeInWords } from "./axes.js";
 import { quantity, round125 } from "./units.js";
 
 const canvas = document.getElementById("image"), stage = document.getElementById("stage");
 const context = canvas.getContext("2d");
 const scale = document.getElementById("scale"), here = document.getElementById("here");
+
+let again = () => {};
 
 export function show(frame, wanted) {
   const { width, height } = frame.info;
@@ -23,6 +26,7 @@ export function show(frame, wanted) {
     context.drawImage(small, 0, 0, w, h);
   }
   showScale(frame.info);
+  if (!frame.info.draft) again();
 }
 
 function showScale(info) {
@@ -31,7 +35,8 @@ function showScale(info) {
   const metres = info.pixel_m * info.width, bar = round125(metres / 4);
   scale.firstElementChild.textContent = quantity(bar, "m");
   scale.lastElementChild.style.width = `${bar / metres * box.width}px`;
-  scale.style.left = `${box.left - stage.getBoundingClientRect().left + 12}px`;
+  // Lower right: vectors have their own scale on the left.
+  scale.style.right = `${stage.getBoundingClientRect().right - box.right + 12}px`;
 }
 
 const place = e => {
@@ -40,39 +45,72 @@ const place = e => {
   return [clamp((e.clientX - box.left) / box.width), clamp((e.clientY - box.top) / box.height)];
 };
 
-// `actions`: angles() and orbit(azimuth, elevation); paints() and paint(points); trace(at) for the deflection; mark(point on the filter or null).
+// `actions`: tool(), "orbit", "paint" or "profile"; angles(), orbit(azimuth, elevation) and
+// turned() when an orbit ends; paint(points); line(from, to) and moveLine(dx, dy) of the profile;
+// zoom(factor, point), pan() for a function of the way in parts of the image, and whole(); trace(at)
+// for the deflection; mark(point on the filter, deflection), null without light.
 export function interact(actions) {
-  let drag = null, points = [], tracing = false, next = null;
+  let drag = null, points = [], tracing = false, next = null, pointer = null;
+  // Another image has other values under a pointer that rests.
+  again = () => { if (pointer && !drag) read(pointer); };
 
   canvas.addEventListener("pointerdown", e => {
-    if (e.button !== 0) return;
+    const moves = e.button === 1 || (e.button === 0 && e.shiftKey);
+    if (e.button !== 0 && !moves) return;
     canvas.setPointerCapture(e.pointerId);
-    drag = { x: e.clientX, y: e.clientY, angles: actions.angles(), paints: actions.paints() };
-    points = drag.paints ? [place(e)] : [];
+    const tool = moves ? "pan" : actions.tool();
+    drag = { x: e.clientX, y: e.clientY, at: place(e), angles: actions.angles(), tool, moved: false };
+    if (moves) drag.pan = actions.pan();
+    points = tool === "paint" ? [place(e)] : [];
     canvas.focus();
     e.preventDefault();
   });
   canvas.addEventListener("pointermove", e => {
-    if (!drag) { read(place(e)); return; }
-    if (drag.paints) {
-      for (const c of e.getCoalescedEvents?.().length ? e.getCoalescedEvents() : [e]) points.push(place(c));
-      if (points.length > 12) flush(true);
-      return;
+    pointer = place(e);
+    if (!drag) { read(pointer); return; }
+    drag.moved = true;
+    const box = canvas.getBoundingClientRect();
+    const [dx, dy] = [(e.clientX - drag.x) / box.width, (e.clientY - drag.y) / box.height];
+    switch (drag.tool) {
+      case "paint":
+        for (const c of e.getCoalescedEvents?.().length ? e.getCoalescedEvents() : [e]) points.push(place(c));
+        if (points.length > 12) flush(true);
+        return;
+      case "profile": actions.line(drag.at, place(e)); return;
+      case "pan": drag.pan(dx, dy); return;
+      // Dragging across the whole image is half a turn. The side near the camera follows the pointer.
+      default: actions.orbit(drag.angles[0] - 180 * dx, drag.angles[1] + 180 * (e.clientY - drag.y) / box.width);
     }
-    // Dragging across the whole image is half a turn. The side near the camera follows the pointer.
-    const turn = 180 / canvas.getBoundingClientRect().width;
-    actions.orbit(drag.angles[0] - (e.clientX - drag.x) * turn, drag.angles[1] + (e.clientY - drag.y) * turn);
   });
-  const end = () => { if (drag?.paints) flush(false); drag = null; };
+  const end = () => {
+    if (drag?.tool === "paint") flush(false);
+    if (drag?.tool === "orbit" && drag.moved) actions.turned();
+    drag = null;
+  };
   canvas.addEventListener("pointerup", end);
   canvas.addEventListener("pointercancel", end);
-  canvas.addEventListener("pointerleave", () => { here.textContent = ""; actions.mark(null); });
-  canvas.addEventListener("keydown", e => {
-    const step = { ArrowLeft: [5, 0], ArrowRight: [-5, 0], ArrowUp: [0, -5], ArrowDown: [0, 5] }[e.key];
-    if (!step) return;
+  canvas.addEventListener("pointerleave", () => { next = pointer = null; here.textContent = ""; actions.mark(null, null); });
+  canvas.addEventListener("wheel", e => {
     e.preventDefault();
-    const [a, b] = actions.angles();
-    actions.orbit(a + step[0], b + step[1]);
+    // Lines or pages, where the mouse does not count in pixels.
+    const pixels = e.deltaY * [1, 16, 400][e.deltaMode];
+    actions.zoom(Math.exp(0.0015 * Math.max(-400, Math.min(400, pixels))), place(e));
+  }, { passive: false });
+  canvas.addEventListener("keydown", e => {
+    if (e.ctrlKey || e.altKey || e.metaKey) return;
+    const factor = { "+": 1 / 1.25, "=": 1 / 1.25, "-": 1.25 }[e.key];
+    const way = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[e.key];
+    if (!factor && !way && e.key !== "0") return;
+    e.preventDefault();
+    if (factor) actions.zoom(factor, [0.5, 0.5]);
+    else if (!way) actions.whole();
+    else if (e.shiftKey) actions.pan()(0.1 * way[0], -0.1 * way[1]);
+    else if (actions.tool() === "profile") actions.moveLine(-0.01 * way[0], 0.01 * way[1]);
+    else {
+      const [a, b] = actions.angles();
+      actions.orbit(a + 5 * way[0], b + 5 * way[1]);
+      actions.turned();
+    }
   });
 
   // Fills the gaps between pointer events pixel by pixel, because every pixel has its own point on the filter.
@@ -96,14 +134,18 @@ export function interact(actions) {
       next = null;
       try {
         const t = await actions.trace(now);
-        if (t.dark) { here.textContent = "no light"; actions.mark(null); continue; }
+        const at = placeInWords(now);
+        if (t.dark) { here.textContent = `${at}: no light`; actions.mark(null, null); continue; }
         const [x, y] = t.deflection_rad;
-        here.textContent = `deflected ${quantity(x, "rad")} right, ${quantity(y, "rad")} up`;
-        actions.mark(t.filter_m);
+        here.textContent = `${at}: deflected ${quantity(x, "rad")} right, ${quantity(y, "rad")} up`;
+        actions.mark(t.filter_m, t.deflection_rad);
       } catch { here.textContent = ""; }
     }
     tracing = false;
   }
 }
 
-export const setPainting = on => canvas.classList.toggle("painting", on);
+export function setTool(tool) {
+  canvas.classList.toggle("painting", tool === "paint");
+  canvas.classList.toggle("drawing", tool === "profile");
+}

@@ -4,23 +4,32 @@ import * as server from "./server.js";
 import * as image from "./image.js";
 import * as filter from "./filter.js";
 import * as settings from "./settings.js";
+import * as flow from "./flow.js";
+import * as axes from "./axes.js";
+import * as legend from "./legend.js";
+import * as profile from "./profile.js";
+import * as rows from "./rows.js";
+import * as save from "./save.js";
 import * as curves from "./curves.js";
 import { quantity, percent, linear } from "./units.js";
 
 const $ = id => document.getElementById(id);
-let state = null, info = null, angles = null, tool = "orbit", lostSince = null;
+let state = null, info = null, angles = null, tool = "orbit", lostSince = null, failed = false;
 
 // ---- From the program -------------------------------------------------------------------------------------------
 
 const AXES = { x: [0, 0], y: [-90, 0], z: [-90, 90] };
 
-function onState(next) {
+// With `all`, fields that have the focus are written too: what was refused goes back.
+function onState(next, all = false) {
   state = { ...next, half: filter.half() || 1e-3 };
+  if (all) wanted = null;
   $("file").textContent = next.file || "";
   const direction = next.effective.view.direction;
   angles = AXES[direction] || direction.split(",").map(Number);
   showTime(next);
-  settings.show(state);
+  settings.show(state, all);
+  flow.show(state, all);
   curves.show(state);
   const paints = canPaint();
   filter.lock(!paints);
@@ -44,9 +53,22 @@ const canPaint = () => kind() === "schlieren";
 function onFrame(frame) {
   info = frame.info;
   $("progress").firstElementChild.style.width = info.finished ? "100%" : info.samples_wanted && !info.draft ? `${Math.round(10 + 80 * Math.log2(1 + info.samples) / Math.log2(1 + info.samples_wanted))}%` : "8%";
-  if (info.error) { say(info.error); $("done").textContent = "no image"; return; }
-  image.show(frame, state?.effective.film.size);
+  // Another page, or the flow's shape, has changed the scene.
+  if (state && info.generation > state.generation) server.refresh().catch(() => {});
+  if (info.error) {
+    failed = true;
+    say(info.error, false, { text: "go back", act: server.back });
+    $("done").textContent = "no image";
+    mark();
+    return;
+  }
+  if (failed) { failed = false; say(null); }
+  if (info.generation === state?.generation) wanted = null;
+  image.show(frame, info.film_size);
   filter.show(frame);
+  axes.show(info);
+  legend.show(frame, state?.effective, state?.overlay);
+  profile.showFrame(frame, state?.overlay);
   if (state) state.half = filter.half();
   if (!$("radius").dataset.touched && info.filter_half_m) $("radius").value = Number((info.filter_half_m * 1e3 / 12).toPrecision(2));
   const rate = info.rays / info.elapsed_secs;
@@ -65,8 +87,12 @@ function onFrame(frame) {
     ["light along", angles ? `azimuth ${Math.round(angles[0] * 10) / 10}°, elevation ${Math.round(angles[1] * 10) / 10}°` : "–"],
     ["march", info.march || "–"],
   ]);
-  $("warnings").replaceChildren(...(info.finished ? info.warnings : []).map(w => Object.assign(document.createElement("li"), { textContent: w })));
-  // For scripts that wait for a frame.
+  $("warnings").replaceChildren(...(info.finished ? info.warnings : []).map(w => Object.assign(document.createElement("li"), { textContent: inWords(w) })));
+  mark();
+}
+
+// For scripts that wait for a frame.
+function mark() {
   document.body.dataset.serial = info.serial;
   document.body.dataset.generation = info.generation;
   document.body.dataset.finished = info.finished;
@@ -80,10 +106,25 @@ function numbers(pairs) {
   }));
 }
 
-function say(text, note = false) {
+// What the library's warnings name by keys and options, in the words of the page.
+const WORDS = [
+  ["flow.resample_nodes, --resample", "“resample to”"],
+  ["flow.smoothing_nodes, --smoothing", "“smoothing”"],
+  ["march.tolerance_rad, --tolerance", "“tolerance”"],
+  ["flow.outside", "“outside the mesh”"],
+];
+const inWords = warning => WORDS.reduce((w, [key, label]) => w.replaceAll(key, label), warning);
+
+// A message, or none; `action` is a button beside it.
+function say(text, note = false, action = null) {
   const box = $("message");
   box.hidden = !text;
   box.textContent = text || "";
+  if (action) {
+    const button = Object.assign(document.createElement("button"), { textContent: action.text });
+    button.addEventListener("click", action.act);
+    box.append(button);
+  }
   box.classList.toggle("note", note);
 }
 
@@ -95,7 +136,12 @@ function onLost(lost) {
 // ---- To the program ---------------------------------------------------------------------------------------------
 
 server.listen(onState, say);
-settings.listen(server.change);
+rows.listen(patch => {
+  if (patch.fit === false || patch.film?.size) fits = false;
+  server.change(patch);
+}, say);
+profile.listen(say);
+save.listen(say);
 curves.listen(server.change);
 
 function orbit(azimuth, elevation) {
@@ -104,21 +150,74 @@ function orbit(azimuth, elevation) {
   server.change({ view: { direction: `${angles[0]},${angles[1]}` } });
 }
 
+// A frame that follows the flow is fitted when a turn ends, because it would jump during one.
+const turned = () => { if (state?.fit) server.change({ fit: true }); };
+
+// ---- The frame
+
+// The frame that was asked for and is not shown yet: width in metres and middle. `fits` is whether
+// the frame followed the flow before it was zoomed.
+let wanted = null, fits = false;
+
+function frameNow() {
+  if (wanted) return wanted;
+  fits ||= state?.fit ?? false;
+  return { width_m: info.pixel_m * info.width, center_m: info.center_m };
+}
+
+function setFrame(next) {
+  wanted = next;
+  const digits = v => Number(v.toPrecision(6));
+  server.change({ film: { field_of_view_m: digits(next.width_m), center_m: next.center_m.map(digits) } });
+}
+
+const sides = ({ width_m }) => [width_m, width_m * info.height / info.width];
+
+// The point under the pointer stays where it is.
+function zoom(factor, at) {
+  if (!info?.width) return;
+  const now = frameNow(), width_m = now.width_m * factor;
+  // Beyond the whole flow there is nothing, and far inside of it no more to see than a cell.
+  if (factor > 1 && width_m >= info.whole_width_m) { whole(); return; }
+  if (factor < 1 && width_m < 1e-3 * info.whole_width_m) return;
+  const [w, h] = sides(now), from = [(at[0] - 0.5) * w, (0.5 - at[1]) * h];
+  setFrame({ width_m, center_m: now.center_m.map((c, i) => c + from[i] * (1 - factor)) });
+}
+
+function pan() {
+  if (!info?.width) return () => {};
+  const start = frameNow(), [w, h] = sides(start);
+  const moved = (dx, dy) => [start.center_m[0] - dx * w, start.center_m[1] + dy * h];
+  return (dx, dy) => setFrame({ width_m: start.width_m, center_m: moved(dx, dy) });
+}
+
+function whole() {
+  wanted = null;
+  const same = fits || state?.fit;
+  server.change(same ? { fit: true } : { film: { field_of_view_m: null, center_m: [0, 0] } });
+}
+
+// ---- Tools
+
 const radius = () => Math.max(1e-9, Number($("radius").value) / 1e3 || 0);
 const paint = on => points => server.paint({ on, points, radius_m: radius(), rgb: linear($("color").value) });
 
 image.interact({
-  angles: () => angles || [0, 0], orbit, paints: () => tool === "paint" && canPaint(), paint: paint("picture"), trace: server.trace, mark: filter.point,
+  angles: () => angles || [0, 0], orbit, turned, tool: () => tool, paint: paint("picture"),
+  line: profile.setLine, moveLine: profile.move, zoom, pan, whole, trace: server.trace,
+  mark: (at, deflection) => { filter.point(at); legend.point(deflection); },
 });
 filter.interact({ paints: canPaint, radius, paint: paint("filter") });
 
 function setTool(next) {
   tool = next;
   document.querySelector(`input[name=tool][value=${next}]`).checked = true;
-  image.setPainting(next === "paint");
+  image.setTool(next);
+  profile.setActive(next === "profile");
 }
 for (const input of document.querySelectorAll("input[name=tool]")) input.addEventListener("change", () => setTool(input.value));
-for (const button of document.querySelectorAll("[data-view]")) button.addEventListener("click", () => server.change({ view: { direction: button.dataset.view } }));
+for (const button of document.querySelectorAll("[data-view]")) button.addEventListener("click", () => server.change({ view: { direction: button.dataset.view }, ...(state?.fit ? { fit: true } : {}) }));
+$("whole").addEventListener("click", whole);
 $("step").addEventListener("input", () => server.change({ step: Number($("step").value) }));
 $("radius").addEventListener("input", () => { $("radius").dataset.touched = "1"; });
 

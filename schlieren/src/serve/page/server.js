@@ -22,7 +22,15 @@ async function call(path, body) {
   return answer;
 }
 
+// The frame is chosen or fitted: the later wish counts.
+function choose(patch) {
+  const keys = ["size", "field_of_view_m", "center_m"], film = waiting?.film;
+  if (patch.fit && film) for (const key of keys) delete film[key];
+  if (waiting && keys.some(key => patch.film && key in patch.film)) delete waiting.fit;
+}
+
 export async function change(patch) {
+  choose(patch);
   waiting = waiting ? merge(waiting, patch) : structuredClone(patch);
   if (busy) return;
   busy = true;
@@ -30,13 +38,19 @@ export async function change(patch) {
     const next = waiting;
     waiting = null;
     try { onState(await call("scene", next)); onError(null); }
-    catch (e) { onError(e.message); try { onState(await call("state")); } catch { /* `frames` reports a lost connection */ } }
+    catch (e) { onError(e.message); try { onState(await call("state"), true); } catch { /* `frames` reports a lost connection */ } }
   }
   busy = false;
 }
 
 export const refresh = async () => onState(await call("state"));
 export const trace = at => call("trace", { at });
+export const profile = (from, to) => call("profile", { from, to });
+
+// To the last scene that was shown.
+export async function back() {
+  try { onState(await call("back", {}), true); onError(null); } catch (e) { onError(e.message); }
+}
 
 // Strokes are sent one after the other, so that later ones cover earlier ones.
 let strokes = Promise.resolve();
@@ -56,7 +70,9 @@ function decode(buffer) {
   const take = n => { const bytes = new Uint8Array(buffer, at, n); at += n; return bytes; };
   const rgb = take(3 * info.width * info.height), n = info.filter_pixels * info.filter_pixels;
   const filter = take(3 * n);
-  return { info, rgb, filter, light: n ? new Float32Array(buffer.slice(at, at + 4 * n)) : new Float32Array(0) };
+  const light = new Float32Array(buffer.slice(at, at + 4 * n));
+  at += 4 * n;
+  return { info, rgb, filter, light, legend: take(3 * info.legend_pixels ** 2) };
 }
 
 export async function frames(show, lost) {

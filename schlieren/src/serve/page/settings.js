@@ -1,16 +1,7 @@
-// The settings of the bench. Each row defines what it reads from the effective scene and which change it sends.
+// The settings of the bench: what each technique has.
 
-const host = document.getElementById("technique");
-let built = "", rows = [], send = () => {};
-
-export function listen(change) { send = change; }
-
-const number = (label, unit, factor, get, set, more = {}) => ({ kind: "number", label, unit, factor, get, set, ...more });
-const range = (label, unit, low, high, step, get, set) => ({ kind: "range", label, unit, low, high, step, factor: 1, get, set });
-const choice = (label, options, get, set) => ({ kind: "choice", label, options, get, set });
-const text = (label, unit, get, set, more = {}) => ({ kind: "text", label, unit, get, set, ...more });
-
-// ---- Definitions of rows ----------------------------------------------------------------------------------------
+import { check, choice, number, numbers, one, range, shower, text } from "./rows.js";
+import { ROWS, TECHNIQUES } from "./help.js";
 
 function cutoffRows(state) {
   const kinds = ["knife", "circle", "complemented-circle", "color", "painted"];
@@ -83,6 +74,13 @@ function techniqueRows(state) {
   }
 }
 
+// What is drawn over an image: how far dots move, or how light is bent.
+function vectorRows(state) {
+  if (["volume", "slice"].includes(state.effective.technique.kind)) return [];
+  return [choice("vectors", ["none", "arrows", "lic"], s => s.overlay ?? "none",
+    v => ({ overlay: v === "none" ? null : v }))];
+}
+
 function lightRows(state) {
   const e = s => s.effective, light = s => e(s).light, kind = e(state).technique.kind, rows = [];
   const source = light(state).source;
@@ -104,13 +102,14 @@ function lightRows(state) {
     rows.push(number("schlieren lens f₂", "m", 1, s => e(s).lenses.schlieren_m, v => ({ lenses: { schlieren_m: v } })));
   if (e(state).film.focus_m !== undefined)
     rows.push(number({ shadowgraph: "film distance", bos: "background at" }[kind] || "in focus at", "mm", 1e3, s => e(s).film.focus_m, v => ({ film: { focus_m: v } })));
-  rows.push(text("wavelengths", "nm", s => light(s).wavelengths_nm.join(", "), v => ({ light: { wavelengths_nm: v.split(/[\s,]+/).filter(Boolean).map(Number), weights: null } })));
+  rows.push(text("wavelengths", "nm", s => light(s).wavelengths_nm.join(", "), v => ({ light: { wavelengths_nm: numbers("wavelengths", v), weights: null } })));
   return rows;
 }
 
 function filmRows(state) {
   const e = s => s.effective, film = s => e(s).film, rows = [];
-  rows.push(text("pixels", "", s => film(s).size.join(" × "), v => ({ film: { size: v.split(/[^0-9]+/).filter(Boolean).map(Number) } })));
+  rows.push(text("pixels", "", s => film(s).size.join(" × "), v => ({ film: { size: numbers("pixels", v) } })));
+  rows.push(check("fit the flow", s => s.fit, v => ({ fit: v })));
   rows.push(number("field of view", "mm", 1e3, s => film(s).field_of_view_m, v => ({ film: { field_of_view_m: v } }), { empty: "all" }));
   rows.push(number("exposure", "×", 1, s => film(s).exposure, v => ({ film: { exposure: v } })));
   const sampling = e(state).sampling;
@@ -128,75 +127,22 @@ function filmRows(state) {
     const filters = { none: { kind: "none" }, gaussian: { kind: "gaussian", sigma_px: 0.8 }, mean: { kind: "mean", radius_px: 1 }, cone: { kind: "cone", nearest: 16 } };
     rows.push(choice("noise filter", Object.keys(filters), s => e(s).sampling.filter.kind, (v, s) => ({ sampling: { ...e(s).sampling, filter: filters[v] } })));
   }
-  rows.push(text("tolerance", "rad", s => e(s).march.tolerance_rad.toExponential().replace("e+0", ""), v => ({ march: { tolerance_rad: Number(v) } })));
+  rows.push(text("tolerance", "rad", s => e(s).march.tolerance_rad.toExponential().replace("e+0", ""), v => ({ march: { tolerance_rad: one("tolerance", v) } })));
   return rows;
 }
 
-// ---- Elements of rows -------------------------------------------------------------------------------------------
-
-function element(row, state) {
-  if (row.kind === "hint") {
-    const p = document.createElement("p");
-    p.className = "hint";
-    row.update = s => { p.textContent = row.get(s); };
-    return p;
-  }
-  const label = document.createElement("label"), name = document.createElement("span");
-  label.className = "row";
-  name.textContent = row.label;
-  label.append(name);
-  const unit = document.createElement("em");
-  unit.textContent = row.unit || "";
-  let input;
-  const tell = value => send(row.set(value, row.state));
-  if (row.kind === "choice") {
-    input = document.createElement("select");
-    for (const o of row.options) input.append(new Option(o, o));
-    input.addEventListener("change", () => tell(input.value));
-    row.update = s => { row.state = s; input.value = row.get(s); };
-  } else if (row.kind === "range") {
-    input = document.createElement("input");
-    Object.assign(input, { type: "range", min: row.low, max: row.high, step: row.step });
-    const shown = document.createElement("b");
-    const say = v => { shown.textContent = `${Number(Number(v).toPrecision(4))}${row.unit}`; };
-    input.addEventListener("input", () => { say(input.value); tell(Number(input.value)); });
-    row.update = s => { row.state = s; if (document.activeElement !== input) input.value = row.get(s); say(input.value); };
-    label.append(input, shown);
-    row.input = input;
-    input.name = row.label;
-    return label;
-  } else {
-    input = document.createElement("input");
-    input.type = row.kind === "number" ? "number" : "text";
-    if (row.kind === "number") input.step = "any";
-    if (row.empty) input.placeholder = row.empty;
-    const shown = s => {
-      const v = row.get(s);
-      if (row.kind === "text") return v;
-      return v === undefined || v === null ? "" : String(Number((v * row.factor).toPrecision(6)));
-    };
-    input.addEventListener("change", () => {
-      if (row.kind === "text") return tell(input.value);
-      if (input.value === "") { if (row.empty) tell(null); else input.value = shown(row.state); return undefined; }
-      return tell(Number(input.value) / row.factor);
-    });
-    row.update = s => { row.state = s; if (document.activeElement !== input || !input.matches(":focus")) input.value = shown(s); };
-  }
-  input.name = row.label;
-  row.input = input;
-  label.append(input);
-  if (row.unit) label.append(unit);
-  return label;
-}
-
-export function show(state) {
+function shapeOf(state) {
   const e = state.effective, t = e.technique;
-  const shape = JSON.stringify([t.kind, t.cutoff?.kind, t.cutoff?.open_m !== undefined, !!t.fringe_spacing_m, e.light.source?.kind, e.sampling?.method, e.sampling?.samples]);
-  if (shape !== built) {
-    built = shape;
-    const technique = choice("technique", state.techniques, s => s.effective.technique.kind, v => ({ technique: { kind: v } }));
-    rows = [technique, ...techniqueRows(state), ...lightRows(state), ...filmRows(state)];
-    host.replaceChildren(...rows.map(r => element(r, state)));
-  }
-  for (const row of rows) row.update(state);
+  return [t.kind, t.cutoff?.kind, t.cutoff?.open_m !== undefined, !!t.fringe_spacing_m,
+    e.light.source?.kind, e.sampling?.method, e.sampling?.samples];
 }
+
+function rowsOf(state) {
+  const technique = choice("technique", state.techniques, s => s.effective.technique.kind,
+    v => ({ technique: { kind: v } }), { help: TECHNIQUES, list: true });
+  const about = { kind: "hint", get: s => TECHNIQUES[s.effective.technique.kind] };
+  return [technique, about, ...techniqueRows(state), ...vectorRows(state), ...lightRows(state),
+    ...filmRows(state)];
+}
+
+export const show = shower(document.getElementById("technique"), ROWS, shapeOf, rowsOf);

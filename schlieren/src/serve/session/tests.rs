@@ -1,3 +1,4 @@
+use super::paint::strokes;
 use super::*;
 use serde_json::json;
 

@@ -1,0 +1,50 @@
+//! Deflections along a line on the image.
+
+use super::{RefusedChange, Session, refused};
+use crate::serve::filter_plane::traced;
+use serde::Serialize;
+
+/// Points of a profile.
+const POINTS: usize = 257;
+
+/// Deflections at equal distances along a line.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(in crate::serve) struct Profile {
+    /// Length of the line in the test section.
+    pub(in crate::serve) length_m: f64,
+    /// Deflection to the right and up; nothing where no light lands.
+    pub(in crate::serve) deflection_rad: Vec<Option<[f32; 2]>>,
+}
+
+impl Session {
+    /// The profile between two points of the image, 0 to 1 from its upper left corner.
+    ///
+    /// # Errors
+    /// If a point is outside the image, both are one, or there is no image yet.
+    pub(in crate::serve) fn profile(
+        &self,
+        from: [f64; 2],
+        to: [f64; 2],
+    ) -> Result<Profile, RefusedChange> {
+        if !from.iter().chain(&to).all(|c| (0.0..=1.0).contains(c)) {
+            return Err(refused("points on the image are 0 to 1 from its upper left corner"));
+        }
+        if from == to {
+            return Err(refused("a profile needs two points that differ"));
+        }
+        let shared = self.lock();
+        let view = shared.frame.as_ref().and_then(|f| f.traced.clone());
+        let f2_m = shared.scene.optics().schlieren_focal_length_m;
+        drop(shared);
+        let view = view.ok_or_else(|| refused("the image is not rendered yet"))?;
+        let side = |c: usize, n: u32| (to[c] - from[c]) * f64::from(n) * view.framing.pixel_m;
+        let length_m = side(0, view.framing.width).hypot(side(1, view.framing.height));
+        let point = |i: usize| {
+            let t = i as f64 / (POINTS - 1) as f64;
+            [0, 1].map(|c| (from[c] + t * (to[c] - from[c])).clamp(0.0, 1.0))
+        };
+        let deflection =
+            |i: usize| traced(&view.map, &view.framing, f2_m, point(i)).map(|found| found.0);
+        Ok(Profile { length_m, deflection_rad: (0..POINTS).map(deflection).collect() })
+    }
+}
