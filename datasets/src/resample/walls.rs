@@ -37,9 +37,19 @@ pub struct Walls {
     of_points: Vec<bool>,
     /// Corners of the faces of the border, one after the other.
     rings: Vec<u32>,
-    /// End of each ring, and whether the face is a wall.
-    faces: Vec<(usize, bool)>,
+    faces: Vec<BorderFace>,
     evidence: Vec<String>,
+}
+
+/// A face of the border that does not lie in a side of the mesh's box.
+#[derive(Debug, Clone, Copy)]
+struct BorderFace {
+    /// End of its corners.
+    end: usize,
+    cell: u32,
+    /// Its number among the faces of the cell.
+    number: u32,
+    is_wall: bool,
 }
 
 impl Walls {
@@ -64,17 +74,21 @@ impl Walls {
                 continue;
             }
             let corners = mesh.corners(cell);
-            let mut number = 0;
+            let mut next = 0;
             corners.shape.each_face(|ring| {
-                let outside = beyond[number] == OUTSIDE;
-                number += 1;
+                let number = next;
+                next += 1;
                 let ids = || ring.iter().map(|&i| corners.ids[i as usize]);
-                if !outside || sides.hold(mesh, ids()) || is_face_of_plane(mesh, ids()) {
+                if beyond[number] != OUTSIDE
+                    || sides.hold(mesh, ids())
+                    || is_face_of_plane(mesh, ids())
+                {
                     return;
                 }
                 let is_wall = mesh.is_hidden(cell) || ids().all(|i| walls.of_points[i as usize]);
                 walls.rings.extend(ids());
-                walls.faces.push((walls.rings.len(), is_wall));
+                let (end, cell, number) = (walls.rings.len(), cell as u32, number as u32);
+                walls.faces.push(BorderFace { end, cell, number, is_wall });
             });
         }
         walls.add_holes(mesh, &same, &sides);
@@ -86,19 +100,19 @@ impl Walls {
         &self.evidence
     }
 
-    /// For each point of the mesh, whether it is one of a wall.
-    pub fn of_points(&self) -> &[bool] {
-        &self.of_points
-    }
-
     /// Calls `f` with the corners of each face of the border that does not lie in a side of the
     /// mesh's box, and whether it is a wall.
     pub(super) fn each_face(&self, mut f: impl FnMut(&[u32], bool)) {
         let mut first = 0;
-        for &(end, is_wall) in &self.faces {
-            f(&self.rings[first..end], is_wall);
-            first = end;
+        for face in &self.faces {
+            f(&self.rings[first..face.end], face.is_wall);
+            first = face.end;
         }
+    }
+
+    /// The walls: cells, and numbers of faces among those of the cell.
+    pub(super) fn of_cells(&self) -> impl Iterator<Item = (u32, u32)> {
+        self.faces.iter().filter(|f| f.is_wall).map(|f| (f.cell, f.number))
     }
 
     /// The points that a reader lists. Returns whether there is a list, which may be empty.
@@ -212,14 +226,13 @@ impl Walls {
         let mut first = 0;
         let mut found = false;
         for k in 0..self.faces.len() {
-            let (end, is_wall) = self.faces[k];
             let part = root(&mut parent, same[self.rings[first] as usize]) as usize;
+            let face = &mut self.faces[k];
             if !open[part] {
-                found |= !is_wall;
-                self.faces[k].1 = true;
-                self.rings[first..end].iter().for_each(|&i| self.of_points[i as usize] = true);
+                found |= !face.is_wall;
+                face.is_wall = true;
             }
-            first = end;
+            first = face.end;
         }
         if found {
             self.evidence.push("holes that the mesh encloses".into());

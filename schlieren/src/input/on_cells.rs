@@ -60,7 +60,7 @@ pub fn cells_from_dataset(
         _ => Walls::default(),
     };
     plausible::warn_size(high - low, &mut report);
-    let cells = CellField::with_walls(mesh, samples, options.reconstruction, walls.of_points())?;
+    let cells = CellField::with_walls(mesh, samples, options.reconstruction, &walls)?;
     report.warnings.extend(cells.report().warnings());
     report.cells = Some(*cells.report());
     let largest = cells.largest() + background;

@@ -89,24 +89,16 @@ impl Neighbours {
         Neighbours { starts, beyond, crowded }
     }
 
-    /// Takes those faces of the border whose corners are all points of walls as walls.
-    pub(super) fn mark_walls(&mut self, mesh: &Mesh, wall_points: &[bool]) {
-        for cell in 0..mesh.num_cells() {
-            let beyond = &mut self.beyond[self.starts[cell]..self.starts[cell + 1]];
-            if !beyond.contains(&OUTSIDE) {
-                continue;
+    /// Takes faces of the border as walls, each the face of this number of this cell. Faces that
+    /// are not of the border stay.
+    pub(super) fn mark_walls(&mut self, walls: impl Iterator<Item = (u32, u32)>) {
+        for (cell, number) in walls {
+            let first = self.starts.get(cell as usize).copied().unwrap_or(self.beyond.len());
+            if let Some(beyond) = self.beyond.get_mut(first + number as usize)
+                && *beyond == OUTSIDE
+            {
+                *beyond = WALL;
             }
-            let corners = mesh.corners(cell);
-            let mut number = 0;
-            corners.shape.each_face(|ring| {
-                let is_wall = |&i: &u32| {
-                    wall_points.get(corners.ids[i as usize] as usize).is_some_and(|w| *w)
-                };
-                if beyond[number] == OUTSIDE && ring.iter().all(is_wall) {
-                    beyond[number] = WALL;
-                }
-                number += 1;
-            });
         }
     }
 

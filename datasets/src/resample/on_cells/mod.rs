@@ -20,6 +20,7 @@
 //! line leaves one at its border and enters the other at its own.
 
 mod blend;
+mod bodies;
 mod border;
 mod cell;
 mod faces;
@@ -34,8 +35,10 @@ pub use walker::{Beyond, CellWalker, Entry};
 use super::mesh::{Corners, Mesh};
 use super::reconstruct::{Expansion, FitQuality, PointField, Reconstruction, first_at_place};
 use super::shape;
+use super::walls::Walls;
 use super::{ResampleError, Samples};
 use blend::Degree;
+use bodies::Bodies;
 use border::Border;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -95,6 +98,9 @@ pub struct CellField {
     kinds: Vec<Kind>,
     neighbours: Neighbours,
     border: Border,
+    /// The faces of hidden cells at the border of the mesh.
+    hidden: Border,
+    bodies: Option<Bodies>,
     report: CellReport,
 }
 
@@ -162,11 +168,12 @@ impl CellField {
         samples: Samples<'_>,
         reconstruction: Reconstruction,
     ) -> Result<CellField, ResampleError> {
-        CellField::with_walls(mesh, samples, reconstruction, &[])
+        CellField::with_walls(mesh, samples, reconstruction, &Walls::default())
     }
 
-    /// As [`CellField::new`], for a mesh whose walls are known, by a flag for each point
-    /// ([`super::Walls::of_points`]): behind them lines meet [`Beyond::Wall`].
+    /// As [`CellField::new`], for a mesh whose walls are known: behind them lines meet
+    /// [`Beyond::Wall`], and [`CellWalker::passes_body`] knows the bodies. Walls of another mesh
+    /// are none.
     ///
     /// # Errors
     /// As [`CellField::new`].
@@ -174,7 +181,7 @@ impl CellField {
         mesh: Mesh,
         samples: Samples<'_>,
         reconstruction: Reconstruction,
-        wall_points: &[bool],
+        walls: &Walls,
     ) -> Result<CellField, ResampleError> {
         super::check_count(&mesh, samples)?;
         let averaged;
@@ -219,8 +226,10 @@ impl CellField {
             });
         }
         let mut neighbours = Neighbours::of(&mesh, &first_at_place(&mesh), &kinds);
-        neighbours.mark_walls(&mesh, wall_points);
-        let border = Border::of(&mesh, &neighbours, &kinds);
+        neighbours.mark_walls(walls.of_cells());
+        let border = Border::of_gas(&mesh, &neighbours, &kinds);
+        let hidden = Border::of_hidden(&mesh, &neighbours, &kinds);
+        let bodies = Bodies::of(&mesh, walls);
         let (low, high) = mesh.bounds();
         let gas = shapes.iter().filter(|s| s.kind == Kind::Gas);
         let report = CellReport {
@@ -236,7 +245,17 @@ impl CellField {
             fit,
         };
         let values = values.to_vec();
-        Ok(CellField { mesh, values, expansions, kinds, neighbours, border, report })
+        Ok(CellField {
+            mesh,
+            values,
+            expansions,
+            kinds,
+            neighbours,
+            border,
+            hidden,
+            bodies,
+            report,
+        })
     }
 
     /// What the cells are, and what was repaired.

@@ -158,6 +158,21 @@ impl<'a> CellWalker<'a> {
         Some((distance, Beyond::of(beyond)))
     }
 
+    /// Whether the line from `at` in `direction`, of length one, is in a body somewhere within
+    /// `most`, where it is outside all cells. No face tells of a body that fills the span of the
+    /// mesh, along which the line runs. False where the walls of the mesh are not known.
+    pub fn passes_body(&self, at: DVec3, direction: DVec3, most: f64) -> bool {
+        let CellField { mesh, bodies, .. } = self.field;
+        bodies.as_ref().is_some_and(|b| b.meet(mesh, at, direction, most))
+    }
+
+    /// Whether the line passes the border of the mesh at a hidden cell within `most`. `slack` is
+    /// how far `at` may be beyond that border.
+    pub fn passes_hidden(&self, at: DVec3, direction: DVec3, most: f64, slack: f64) -> bool {
+        let CellField { mesh, hidden, .. } = self.field;
+        hidden.first_passage(mesh, at, direction, most, slack).is_some()
+    }
+
     /// A cell that a place is in, of those that are near a cell: its neighbours, and theirs.
     pub fn near(&mut self, cell: u32, at: DVec3) -> Option<u32> {
         let mut seen = vec![cell];
