@@ -4,44 +4,10 @@
 mod outlines;
 
 use datasets::model::Dataset;
-use datasets::resample::Resolution;
 use glam::DVec3;
-use outlines::{Plane, hide, options};
-use schlieren::input::{Options, Outside, cells_from_dataset, from_dataset};
-use schlieren::march::OnCells;
-use schlieren::path::{Exit, LightPaths, PathQuantities, Start, Status};
-use schlieren::plan::{Plan, Request};
-use schlieren::view::View;
-
-use Status::{Blocked, Free};
-
-/// What becomes of light along `direction` through places of the plane z = 0: on the cells, and in
-/// a lattice.
-fn statuses(
-    data: &Dataset,
-    options: &Options,
-    direction: DVec3,
-    places: &[[f64; 2]],
-) -> [Vec<Status>; 2] {
-    let (gas, _) = cells_from_dataset(data, options).expect("the mesh has cells");
-    let view = View::new(direction, DVec3::Y, gas.centre_m()).unwrap();
-    let start = |[x, y]: &[f64; 2]| {
-        // Along the ray to the plane through the view's centre.
-        let at = DVec3::new(*x, *y, 0.0) - gas.centre_m();
-        let position_m = [view.right, view.up].map(|axis| axis.dot(at) as f32);
-        Start { position_m, tilt_rad: [0.0; 2] }
-    };
-    let starts: Vec<Start> = places.iter().map(start).collect();
-    let mut exits = vec![Exit::UNDISTURBED; starts.len()];
-    OnCells::new(&gas, view, PathQuantities::default(), 1).trace_parallel(&starts, &mut exits);
-    let on_cells = exits.iter().map(|e| e.status).collect();
-    let options = Options { resolution: Resolution::Longest(81), ..options.clone() };
-    let field = from_dataset(data, &options).expect("the mesh has cells").field;
-    let request = Request { direction: Some(direction), ..Request::default() };
-    let plan = Plan::new(&field, request);
-    plan.paths(&field, view).trace_parallel(&starts, &mut exits);
-    [on_cells, exits.iter().map(|e| e.status).collect()]
-}
+use outlines::{Plane, hide, options, statuses};
+use schlieren::input::Outside;
+use schlieren::path::Status::{Blocked, Free};
 
 /// Places in the cylinder, in the gas, in a corner of the box, and beside the box.
 const PLACES: [[f64; 2]; 8] = [

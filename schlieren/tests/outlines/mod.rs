@@ -1,10 +1,17 @@
 //! Small flows whose meshes end at bodies and at open borders: planes, and the same with cells
 //! along their span.
+#![allow(dead_code, reason = "each test binary uses its part")]
 
 use datasets::model::{
     Attributes, DataArray, Dataset, Points, UnstructuredGrid, Values, WALL_POINTS,
 };
-use schlieren::input::{Depth, Medium, Options, Outside};
+use datasets::resample::Resolution;
+use glam::DVec3;
+use schlieren::input::{Depth, Medium, Options, Outside, cells_from_dataset, from_dataset};
+use schlieren::march::OnCells;
+use schlieren::path::{Exit, LightPaths, PathQuantities, Start, Status};
+use schlieren::plan::{Plan, Request};
+use schlieren::view::View;
 
 /// A flow in a plane: quads, with density and perhaps velocity at their points.
 #[derive(Clone, Default)]
@@ -148,4 +155,42 @@ pub(crate) fn options(data: &Dataset, outside: Outside) -> Options {
     let flat = matches!(data, Dataset::UnstructuredGrid(g) if g.types.contains(&9));
     let depth = flat.then_some(Depth::Span(1.0));
     Options { outside, depth, ..Options::new(Medium::density("rho")) }
+}
+
+/// What becomes of light along `direction` through places of the plane z = 0: on the cells, and in
+/// a lattice.
+pub(crate) fn statuses(
+    data: &Dataset,
+    options: &Options,
+    direction: DVec3,
+    places: &[[f64; 2]],
+) -> [Vec<Status>; 2] {
+    let (gas, _) = cells_from_dataset(data, options).expect("the mesh has cells");
+    let view = View::new(direction, DVec3::Y, gas.centre_m()).unwrap();
+    let start = |[x, y]: &[f64; 2]| {
+        // Along the ray to the plane through the view's centre.
+        let at = DVec3::new(*x, *y, 0.0) - gas.centre_m();
+        let position_m = [view.right, view.up].map(|axis| axis.dot(at) as f32);
+        Start { position_m, tilt_rad: [0.0; 2] }
+    };
+    let starts: Vec<Start> = places.iter().map(start).collect();
+    let mut exits = vec![Exit::UNDISTURBED; starts.len()];
+    OnCells::new(&gas, view, PathQuantities::default(), 1).trace_parallel(&starts, &mut exits);
+    let on_cells = exits.iter().map(|e| e.status).collect();
+    let options = Options { resolution: Resolution::Longest(81), ..options.clone() };
+    [on_cells, in_lattice(data, &options, view, &starts)]
+}
+
+/// What becomes of light in a lattice.
+pub(crate) fn in_lattice(
+    data: &Dataset,
+    options: &Options,
+    view: View,
+    starts: &[Start],
+) -> Vec<Status> {
+    let field = from_dataset(data, options).expect("the mesh has cells").field;
+    let request = Request { direction: Some(view.forward), ..Request::default() };
+    let mut exits = vec![Exit::UNDISTURBED; starts.len()];
+    Plan::new(&field, request).paths(&field, view).trace_parallel(starts, &mut exits);
+    exits.iter().map(|e| e.status).collect()
 }
