@@ -23,8 +23,7 @@ mod sides;
 mod velocity;
 
 use super::mesh::Mesh;
-use super::on_cells::{Kind, Neighbours, OUTSIDE};
-use super::reconstruct::first_at_place;
+use super::on_cells::OUTSIDE;
 use crate::model::Dataset;
 use parts::{Outline, Parts};
 use sides::{Sides, is_face_of_plane};
@@ -58,11 +57,7 @@ impl Walls {
     /// Finds the walls of a mesh made of `data`. `revolved`: the plane will be revolved about the x
     /// axis, so that a hole may end at the axis.
     pub fn find(mesh: &Mesh, data: &Dataset, revolved: bool) -> Walls {
-        let kinds: Vec<Kind> = (0..mesh.num_cells())
-            .map(|c| if mesh.is_hidden(c) { Kind::Hidden } else { Kind::Gas })
-            .collect();
-        let same = first_at_place(mesh);
-        let neighbours = Neighbours::of(mesh, &same, &kinds);
+        let neighbours = &mesh.topology().neighbours;
         let mut walls = Walls { of_points: vec![false; mesh.num_points()], ..Walls::default() };
         let listed = walls.add_listed(mesh, data);
         if !listed {
@@ -94,7 +89,7 @@ impl Walls {
                 walls.faces.push(BorderFace { end, cell, number, is_wall });
             });
         }
-        walls.add_parts(&Parts::of(mesh, &walls, &same, &sides, velocity.as_ref()), listed);
+        walls.add_parts(&Parts::of(mesh, &walls, &sides, velocity.as_ref()), listed);
         walls
     }
 

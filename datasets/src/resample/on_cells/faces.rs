@@ -3,7 +3,6 @@
 //! Faces are compared by their points, as in `boundary_faces` of the model. Points of different
 //! blocks at the same place are one, so that a face of two blocks is none of the border.
 
-use super::Kind;
 use crate::resample::mesh::Mesh;
 use rayon::prelude::*;
 
@@ -17,6 +16,7 @@ pub(super) const WALL: u32 = u32::MAX - 2;
 pub(super) const NO_FACE: u32 = u32::MAX - 3;
 
 /// The cell behind each face.
+#[derive(Debug, Clone)]
 pub(in crate::resample) struct Neighbours {
     /// Number of the first face of each cell.
     starts: Vec<usize>,
@@ -30,8 +30,8 @@ pub(in crate::resample) struct Neighbours {
 type FaceKey = (u32, [u32; 4]);
 
 impl Neighbours {
-    /// `same` is the first of the points at the same place.
-    pub(in crate::resample) fn of(mesh: &Mesh, same: &[u32], kinds: &[Kind]) -> Neighbours {
+    /// `same` is the first of the points at the same place. Cells without volume are left out.
+    pub(in crate::resample) fn of(mesh: &Mesh, same: &[u32], volumes: &[f64]) -> Neighbours {
         let per_cell: Vec<u32> = (0..mesh.num_cells())
             .into_par_iter()
             .map(|cell| {
@@ -47,7 +47,7 @@ impl Neighbours {
         }));
         let keys_of = |cell: usize| {
             let mut keys: Vec<(FaceKey, u32, usize)> = Vec::new();
-            if kinds[cell] == Kind::LeftOut {
+            if volumes[cell] == 0.0 {
                 return keys;
             }
             let corners = mesh.corners(cell);
@@ -74,10 +74,8 @@ impl Neighbours {
         for shared in keys.chunk_by(|a, b| a.0 == b.0) {
             match shared {
                 [(_, a, face_a), (_, b, face_b)] if a != b => {
-                    let seen = |cell: u32| match kinds[cell as usize] {
-                        Kind::Hidden => HIDDEN,
-                        _ => cell,
-                    };
+                    let seen =
+                        |cell: u32| if mesh.is_hidden(cell as usize) { HIDDEN } else { cell };
                     (beyond[*face_a], beyond[*face_b]) = (seen(*b), seen(*a));
                 }
                 all => {

@@ -75,15 +75,13 @@ struct Sums {
 }
 
 impl<'a> Parts<'a> {
-    /// `same` is the first of the points at the same place.
     pub(super) fn of(
         mesh: &Mesh,
         walls: &Walls,
-        same: &[u32],
         sides: &Sides,
         velocity: Option<&'a Velocity>,
     ) -> Parts<'a> {
-        let (of_faces, count) = joined(walls, same);
+        let (of_faces, count) = joined(walls, mesh.first_at_place());
         let mut sums = vec![Sums::new(); count];
         let mut first = 0;
         for (face, &part) in walls.faces.iter().zip(&of_faces) {
@@ -125,7 +123,8 @@ fn mark_filled(sums: &[Sums], outlines: &mut [(Outline, f64)]) {
     }
 }
 
-/// The part of each face, by the points that faces share, and the number of parts.
+/// The part of each face, by the points that faces share, and the number of parts. `same` is the
+/// first of the points at the same place.
 fn joined(walls: &Walls, same: &[u32]) -> (Vec<u32>, usize) {
     let mut parent: Vec<u32> = (0..same.len() as u32).collect();
     let root = |parent: &mut Vec<u32>, mut i: u32| {
