@@ -1,11 +1,13 @@
 //! Represents any data set as points and solid cells, numbered consecutively over all blocks.
 //! Lattices keep their implicit cells.
 
+mod faces;
 mod layers;
 mod topology;
 
 use super::{ResampleError, extrude};
 use crate::model::{Attributes, CellType, Dataset, Points, UnstructuredGrid, extent_dims};
+pub(super) use faces::{HIDDEN, NO_FACE, Neighbours, OUTSIDE, WALL};
 use glam::DVec3;
 use layers::{flat_source, hidden_cells_of_lattice, plane_normal};
 use rayon::prelude::*;

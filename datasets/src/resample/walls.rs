@@ -20,10 +20,11 @@
 mod known;
 mod parts;
 mod sides;
+#[cfg(test)]
+mod tests;
 mod velocity;
 
-use super::mesh::Mesh;
-use super::on_cells::OUTSIDE;
+use super::mesh::{Mesh, OUTSIDE};
 use crate::model::Dataset;
 use parts::{Outline, Parts};
 use sides::{Sides, is_face_of_plane};

@@ -370,11 +370,12 @@ impl Piecewise<'_, '_> {
             Beyond::Wall => gas.walls,
             Beyond::Cell(_) | Beyond::Outside => gas.outside,
         });
-        // Where faces tell of gas alone, or there is none, bodies may be between.
-        if met == [Node::Gas; 2] && !ends.contains(&Beyond::Hidden) {
+        // Where no face tells of a body, one may be between.
+        if !met.contains(&Node::Solid) && !ends.contains(&Beyond::Hidden) {
             if self.walker.passes_hidden(at_m, direction, length_m, slack_m) {
-                met[0] = gas.hidden;
-            } else if gas.walls != Node::Gas && self.walker.passes_body(at_m, direction, length_m) {
+                met[0] = if gas.hidden == Node::Gas { met[0] } else { gas.hidden };
+            } else if gas.walls != gas.outside && self.walker.passes_body(at_m, direction, length_m)
+            {
                 met[0] = gas.walls;
             }
         }

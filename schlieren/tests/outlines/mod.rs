@@ -166,7 +166,8 @@ pub(crate) fn statuses(
     places: &[[f64; 2]],
 ) -> [Vec<Status>; 2] {
     let (gas, _) = cells_from_dataset(data, options).expect("the mesh has cells");
-    let view = View::new(direction, DVec3::Y, gas.centre_m()).unwrap();
+    let up = if direction.y.abs() > 0.9 { DVec3::Z } else { DVec3::Y };
+    let view = View::new(direction, up, gas.centre_m()).unwrap();
     let start = |[x, y]: &[f64; 2]| {
         // Along the ray to the plane through the view's centre.
         let at = DVec3::new(*x, *y, 0.0) - gas.centre_m();

@@ -1,8 +1,8 @@
 //! Which points are at one place, which cells have volume, and which share a face. It is computed
 //! when it is first asked for, and once for a mesh: reconstruction, walls and cells need it.
 
+use super::faces::Neighbours;
 use super::{Corners, Mesh};
-use crate::resample::on_cells::Neighbours;
 use glam::DVec3;
 use rayon::prelude::*;
 use std::collections::HashMap;

@@ -1,9 +1,8 @@
 //! The faces at the border of a mesh, for the place where a line enters it.
 
 use super::Kind;
-use super::faces::{HIDDEN, Neighbours, OUTSIDE, WALL};
 use crate::resample::face_tree::FaceTree;
-use crate::resample::mesh::Mesh;
+use crate::resample::mesh::{HIDDEN, Mesh, Neighbours, OUTSIDE, WALL};
 use glam::DVec3;
 
 /// Faces of cells with others, or none, behind them.

@@ -23,16 +23,14 @@ mod blend;
 mod bodies;
 mod border;
 mod cell;
-mod faces;
 mod shares;
 #[cfg(test)]
 mod tests;
 mod walker;
 
-pub(super) use faces::{Neighbours, OUTSIDE};
 pub use walker::{Beyond, CellWalker, Entry};
 
-use super::mesh::{Corners, Mesh, Topology};
+use super::mesh::{Corners, Mesh, Neighbours, Topology};
 use super::reconstruct::{Expansion, FitQuality, PointField, Reconstruction};
 use super::shape;
 use super::walls::Walls;

@@ -3,8 +3,8 @@
 use super::CellField;
 use super::blend::{Degree, Share};
 use super::cell::PreparedCell;
-use super::faces::{HIDDEN, OUTSIDE, WALL};
 use super::shares::shares;
+use crate::resample::mesh::{HIDDEN, OUTSIDE, WALL};
 use glam::DVec3;
 
 /// Places for prepared cells: a power of two. Rays that are near each other pass the same cells,

@@ -94,7 +94,7 @@ impl<'a> Parts<'a> {
         let part = |(s, o): (&Sums, &(Outline, f64))| Part {
             outline: o.0,
             motion: velocity.map_or(Motion::Unknown, |v| v.motion(&s.flux)),
-            mean_area: s.area / s.faces,
+            mean_area: s.area / s.faces.max(1.0),
         };
         let all = sums.iter().zip(&outlines).map(part).collect();
         Parts { all, of_faces, velocity }

@@ -3,17 +3,17 @@
 //! Faces are compared by their points, as in `boundary_faces` of the model. Points of different
 //! blocks at the same place are one, so that a face of two blocks is none of the border.
 
-use crate::resample::mesh::Mesh;
+use super::Mesh;
 use rayon::prelude::*;
 
 /// Behind the face is no cell.
 pub(in crate::resample) const OUTSIDE: u32 = u32::MAX;
 /// Behind the face is a cell that the solver hides.
-pub(super) const HIDDEN: u32 = u32::MAX - 1;
+pub(in crate::resample) const HIDDEN: u32 = u32::MAX - 1;
 /// Behind the face is a body.
-pub(super) const WALL: u32 = u32::MAX - 2;
+pub(in crate::resample) const WALL: u32 = u32::MAX - 2;
 /// The face has no area: a side that collapsed.
-pub(super) const NO_FACE: u32 = u32::MAX - 3;
+pub(in crate::resample) const NO_FACE: u32 = u32::MAX - 3;
 
 /// The cell behind each face.
 #[derive(Debug, Clone)]
@@ -89,7 +89,7 @@ impl Neighbours {
 
     /// Takes faces of the border as walls, each the face of this number of this cell. Faces that
     /// are not of the border stay.
-    pub(super) fn mark_walls(&mut self, walls: impl Iterator<Item = (u32, u32)>) {
+    pub(in crate::resample) fn mark_walls(&mut self, walls: impl Iterator<Item = (u32, u32)>) {
         for (cell, number) in walls {
             let first = self.starts.get(cell as usize).copied().unwrap_or(self.beyond.len());
             if let Some(beyond) = self.beyond.get_mut(first + number as usize)
@@ -106,7 +106,7 @@ impl Neighbours {
     }
 
     /// Number of faces that more than two cells have.
-    pub(super) fn crowded(&self) -> usize {
+    pub(in crate::resample) fn crowded(&self) -> usize {
         self.crowded
     }
 }
