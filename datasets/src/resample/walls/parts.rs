@@ -1,4 +1,5 @@
-//! The parts of a mesh's border that do not lie in the sides of its box, and what their shapes tell.
+//! The parts of a mesh's border that do not lie in the sides of its box, and what their shapes
+//! tell.
 //!
 //! A part is what points join. Where it ends, it ends in sides of the box, so that these close it:
 //!
