@@ -174,7 +174,7 @@ fn a_ramp_is_a_body_and_a_slanting_open_border_is_gas() {
         assert!(warned.contains(words), "{warned}");
 
         // On the cells of the same case, light along x, which leaves through the ramp, the outlet
-        // and the border above. (Light that meets no face of a wall passes as through gas.)
+        // and the border above.
         let (gas, _) = load_cells(dir.path(), &options()).unwrap();
         let view = View::along(Axis::X, gas.centre_m());
         let start = |y: f64| {

@@ -1,15 +1,20 @@
 //! Represents any data set as points and solid cells, numbered consecutively over all blocks.
 //! Lattices keep their implicit cells.
 
+mod faces;
 mod layers;
+mod topology;
 
 use super::{ResampleError, extrude};
 use crate::model::{Attributes, CellType, Dataset, Points, UnstructuredGrid, extent_dims};
+pub(super) use faces::{HIDDEN, NO_FACE, Neighbours, OUTSIDE, WALL};
 use glam::DVec3;
 use layers::{flat_source, hidden_cells_of_lattice, plane_normal};
 use rayon::prelude::*;
 use rt_core::math::median_high;
 use std::ops::Range;
+use topology::Computed;
+pub(super) use topology::Topology;
 
 /// Bits of `vtkGhostType` (vtkDataSetAttributes.h): a hidden point, and cells that are refined
 /// elsewhere or hidden.
@@ -26,6 +31,7 @@ pub struct Mesh {
     cells: usize,
     left_out: usize,
     higher_order: usize,
+    computed: Computed,
 }
 
 #[derive(Debug, Clone)]
@@ -109,6 +115,7 @@ impl Mesh {
             cells: 0,
             left_out: 0,
             higher_order: 0,
+            computed: Computed::default(),
         };
         let mut flat = 0;
         for (number, leaf) in data.leaves().into_iter().enumerate() {
@@ -376,6 +383,7 @@ impl Mesh {
     #[must_use]
     pub fn scaled(mut self, factor: f64) -> Mesh {
         self.points.iter_mut().for_each(|p| *p *= factor);
+        self.computed = Computed::default();
         self
     }
 

@@ -15,6 +15,7 @@
 
 mod beyond_border;
 mod extrude;
+mod face_tree;
 mod jumps;
 mod mesh;
 mod on_cells;

@@ -48,7 +48,8 @@ class Report:
         Method, interpolant and step.
     outside : dict or None
         What was decided about places outside the mesh: the part that they are (``percent``), the
-        part in bodies (``bodies_percent``), and what walls were known by (``walls_by``).
+        part in bodies (``bodies_percent``), what walls were known by (``walls_by``), and the part
+        of the border of which nothing tells (``undecided_percent``).
     grid : tuple of int or None
         Nodes of the field; none for light through the cells of a mesh.
     index_formula : str

@@ -128,7 +128,7 @@ impl SamplePoints {
         }
         let revolved = options.depth == Some(Depth::Revolve);
         let walls = Walls::find(mesh, data, revolved);
-        report.outside.get_or_insert_default().walls_by = walls.evidence().to_vec();
+        report.outside.get_or_insert_default().set_walls(&walls);
         Some(in_bodies(mesh, &walls, &on.lattice, &on.marks, revolved))
     }
 

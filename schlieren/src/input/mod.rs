@@ -148,6 +148,9 @@ pub struct OutsideReport {
     pub bodies_percent: Option<f64>,
     /// What the walls were found by, in words; empty when none was found or nothing was asked for.
     pub walls_by: Vec<String>,
+    /// Part of the border, beside the sides of its box, of which nothing tells whether it is a
+    /// wall, in per cent of its area. It is taken as open.
+    pub undecided_percent: f64,
 }
 
 /// What two-dimensional data becomes in space.

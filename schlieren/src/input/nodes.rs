@@ -2,7 +2,10 @@
 
 use super::{Options, Outside, OutsideReport, Report, Role};
 use crate::field::Node;
-use datasets::resample::Mark;
+use datasets::resample::{Mark, Walls};
+
+/// A smaller part of the border that nothing tells of is not worth a warning.
+const LEAST_UNDECIDED_PERCENT: f64 = 1.0;
 
 /// The kinds of the nodes; `None` if all are gas with values. `bodies` says of nodes outside the
 /// mesh whether they are in bodies, if that was found out.
@@ -55,9 +58,14 @@ impl Role {
 }
 
 impl OutsideReport {
+    pub(super) fn set_walls(&mut self, walls: &Walls) {
+        self.walls_by = walls.evidence().to_vec();
+        self.undecided_percent = 100.0 * walls.undecided();
+    }
+
     /// What a user has to check, and how to change it. `of` is what the percentage is of.
     pub(super) fn warning(&self, outside: Outside, of: &str) -> Option<String> {
-        let OutsideReport { percent, bodies_percent, walls_by } = self;
+        let OutsideReport { percent, bodies_percent, walls_by, undecided_percent } = self;
         let is = format!("{percent:.1} % of the {of} lie outside the mesh");
         match (outside, &walls_by[..]) {
             (Outside::Auto, []) => Some(format!(
@@ -67,9 +75,17 @@ impl OutsideReport {
             (Outside::Auto, by) => {
                 let bodies =
                     bodies_percent.map_or(String::new(), |b| format!("; {b:.1} % are bodies"));
+                let undecided = match *undecided_percent {
+                    u if u >= LEAST_UNDECIDED_PERCENT => format!(
+                        ". Nothing tells what is behind {u:.0} % of the border, which is taken as \
+                         open: where a body is there, give it as --solid FILE or set --outside \
+                         solid"
+                    ),
+                    _ => String::new(),
+                };
                 Some(format!(
                     "{is}: behind walls are bodies, and behind the rest of the border gas{bodies}. \
-                     The walls are known by {}; if that is wrong, set --outside",
+                     The walls are known by {}; if that is wrong, set --outside{undecided}",
                     by.join(" and ")
                 ))
             }

@@ -60,7 +60,7 @@ pub fn cells_from_dataset(
         _ => Walls::default(),
     };
     plausible::warn_size(high - low, &mut report);
-    let cells = CellField::with_walls(mesh, samples, options.reconstruction, walls.of_points())?;
+    let cells = CellField::with_walls(mesh, samples, options.reconstruction, &walls)?;
     report.warnings.extend(cells.report().warnings());
     report.cells = Some(*cells.report());
     let largest = cells.largest() + background;
@@ -94,8 +94,8 @@ fn report_outside(cells: &CellField, walls: &Walls, options: &Options, report: &
     if percent < 0.05 {
         return;
     }
-    let walls_by = walls.evidence().to_vec();
-    let found = OutsideReport { percent, bodies_percent: None, walls_by };
+    let mut found = OutsideReport { percent, ..OutsideReport::default() };
+    found.set_walls(walls);
     report.warnings.extend(found.warning(options.outside, "mesh's box"));
     report.outside = Some(found);
 }

@@ -7,7 +7,8 @@
 //!
 //! Where a cell ends at the border of the mesh, the ray goes on straight to the cell that it enters
 //! next. A stretch between is that of a hole, a body, or a gap between blocks. Gaps are shorter
-//! than a thousandth of a cell and change nothing; others are as [`GasOnCells`] says.
+//! than a thousandth of a cell and change nothing; others are as [`GasOnCells`] says. A ray along
+//! the span of a flow may pass a body without meeting a cell; the nearest walls tell.
 
 use super::frame::{BlankCells, clip};
 use super::integrator::Ray;
@@ -244,8 +245,6 @@ struct Piecewise<'p, 'a> {
 
 impl Piecewise<'_, '_> {
     fn run(&mut self) -> End {
-        let gas = self.paths.gas;
-        let mut before = gas.outside;
         let mut slack_m = SLACK * self.paths.typical_cell_m;
         let mut gap_m = GAP * self.paths.typical_cell_m;
         let most_m = MOST_DIAGONALS * self.paths.size_m.length();
@@ -260,7 +259,7 @@ impl Piecewise<'_, '_> {
                 break;
             }
             let Beyond::Cell(cell) = inside else {
-                match self.next_cell(direction, speed, before, slack_m, gap_m) {
+                match self.next_cell(direction, speed, inside, slack_m, gap_m) {
                     Ok(cell) => (from, inside) = (inside, Beyond::Cell(cell)),
                     Err(end) => return end,
                 }
@@ -273,7 +272,7 @@ impl Piecewise<'_, '_> {
                 self.counters.moved_on += 1;
                 self.ray.drift(MOVED_ON * size_m / speed);
                 let near = self.walker.near(cell, self.ray.position_m());
-                (stuck, from, before) = (0, Beyond::Outside, gas.outside);
+                (stuck, from) = (0, Beyond::Outside);
                 inside = near.map_or(Beyond::Outside, Beyond::Cell);
                 continue;
             };
@@ -284,11 +283,6 @@ impl Piecewise<'_, '_> {
             let progress = self.ray.tau_m > farthest_m + NO_PROGRESS * size_m;
             (stuck, farthest_m) =
                 if progress { (0, self.ray.tau_m) } else { (stuck + 1, farthest_m) };
-            before = match beyond {
-                Beyond::Hidden => gas.hidden,
-                Beyond::Wall => gas.walls,
-                Beyond::Cell(_) | Beyond::Outside => gas.outside,
-            };
             (from, inside) = (inside, beyond);
         }
         End::Trapped
@@ -314,12 +308,12 @@ impl Piecewise<'_, '_> {
         true
     }
 
-    /// Goes on straight to the next cell.
+    /// Goes on straight to the next cell. `before` is what was beyond the last one.
     fn next_cell(
         &mut self,
         direction: DVec3,
         speed: f64,
-        before: Node,
+        before: Beyond,
         slack_m: f64,
         gap_m: f64,
     ) -> Result<u32, End> {
@@ -329,16 +323,11 @@ impl Piecewise<'_, '_> {
         // Beyond the box is the reference medium.
         let left_m = clip(at_m - self.paths.low_m, direction, self.paths.size_m)[1].max(0.0);
         let stretch_m = entry.map_or(left_m, |e| e.distance);
-        let after = match entry {
-            Some(e) if e.from == Beyond::Hidden => gas.hidden,
-            Some(e) if e.from == Beyond::Wall => gas.walls,
-            _ => gas.outside,
-        };
         if stretch_m > gap_m {
-            for node in [Node::Solid, Node::Blank] {
-                if before == node || after == node {
-                    return Err(End::Stopped(node));
-                }
+            let ends = [before, entry.map_or(Beyond::Outside, |e| e.from)];
+            let met = self.on_stretch(at_m, direction, [stretch_m, slack_m], ends);
+            if met != Node::Gas {
+                return Err(End::Stopped(met));
             }
         } else if entry.is_some_and(|e| e.distance > 0.0) {
             self.counters.gaps += u64::from(self.ray.tau_m > 0.0);
@@ -364,6 +353,33 @@ impl Piecewise<'_, '_> {
         self.counters.samples += 1;
         self.set_index(eps);
         Ok(entry.cell)
+    }
+
+    /// What a stretch outside the cells meets: a body before blank places, and these before gas.
+    /// `ends` is what the faces say between which it lies.
+    fn on_stretch(
+        &self,
+        at_m: DVec3,
+        direction: DVec3,
+        [length_m, slack_m]: [f64; 2],
+        ends: [Beyond; 2],
+    ) -> Node {
+        let gas = self.paths.gas;
+        let mut met = ends.map(|end| match end {
+            Beyond::Hidden => gas.hidden,
+            Beyond::Wall => gas.walls,
+            Beyond::Cell(_) | Beyond::Outside => gas.outside,
+        });
+        // Where no face tells of a body, one may be between.
+        if !met.contains(&Node::Solid) && !ends.contains(&Beyond::Hidden) {
+            if self.walker.passes_hidden(at_m, direction, length_m, slack_m) {
+                met[0] = if gas.hidden == Node::Gas { met[0] } else { gas.hidden };
+            } else if gas.walls != gas.outside && self.walker.passes_body(at_m, direction, length_m)
+            {
+                met[0] = gas.walls;
+            }
+        }
+        [Node::Solid, Node::Blank].into_iter().find(|n| met.contains(n)).unwrap_or(Node::Gas)
     }
 
     /// Makes the length of w that of the medium, 1 + eps, as a window across the undisturbed ray

@@ -15,11 +15,6 @@ impl Mesh {
         })
     }
 
-    /// Whether the mesh is a plane that got depth.
-    pub(in crate::resample) fn is_plane_with_depth(&self) -> bool {
-        self.parts.iter().any(|p| p.extruded.is_some())
-    }
-
     /// Calls `f` with the number of each leaf of the data, and the points of the mesh from it.
     pub(in crate::resample) fn each_leaf(&self, mut f: impl FnMut(usize, std::ops::Range<usize>)) {
         self.parts.iter().for_each(|p| f(p.leaf, p.points.clone()));

@@ -1,22 +1,16 @@
-//! A tree of boxes over the faces at the border of a mesh, for the place where a line enters it.
+//! The faces at the border of a mesh, for the place where a line enters it.
 
 use super::Kind;
-use super::faces::{HIDDEN, Neighbours, OUTSIDE, WALL};
-use crate::resample::mesh::Mesh;
+use crate::resample::face_tree::FaceTree;
+use crate::resample::mesh::{HIDDEN, Mesh, Neighbours, OUTSIDE, WALL};
 use glam::DVec3;
 
-/// Faces in a leaf, at most.
-const IN_LEAF: usize = 4;
-
-/// The faces with no cell, or a hidden one, behind them.
+/// Faces of cells with others, or none, behind them.
 pub(super) struct Border {
     faces: Vec<Face>,
     /// Points of the faces, one after the other, as in the mesh.
     rings: Vec<u32>,
-    /// The first is the root. Empty for a mesh without a border.
-    nodes: Vec<Node>,
-    /// Numbers of faces in the order of the leaves.
-    order: Vec<u32>,
+    tree: FaceTree,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -28,16 +22,6 @@ struct Face {
     beyond: u32,
     /// Whether the ring runs clockwise, seen from outside the cell.
     clockwise: bool,
-}
-
-#[derive(Debug, Clone, Copy)]
-struct Node {
-    low: DVec3,
-    high: DVec3,
-    /// The left child, which the right one follows; or the first face of a leaf.
-    first: u32,
-    /// Faces of a leaf; 0 for other nodes.
-    count: u32,
 }
 
 /// Where a line passes a face of the border.
@@ -52,12 +36,31 @@ pub(super) struct Passage {
 }
 
 impl Border {
-    pub(super) fn of(mesh: &Mesh, neighbours: &Neighbours, kinds: &[Kind]) -> Border {
-        let (mut faces, mut rings) = (Vec::new(), Vec::new());
-        for (cell, kind) in kinds.iter().enumerate() {
+    /// The faces of the gas with no cell, or a hidden one, behind them.
+    pub(super) fn of_gas(mesh: &Mesh, neighbours: &Neighbours, kinds: &[Kind]) -> Border {
+        let is_gas = |cell: usize| !matches!(kinds[cell], Kind::Hidden | Kind::LeftOut);
+        let cells = (0..kinds.len()).filter(|c| is_gas(*c));
+        Border::of(mesh, neighbours, cells, &[OUTSIDE, WALL, HIDDEN])
+    }
+
+    /// The faces of hidden cells with no cell behind them.
+    pub(super) fn of_hidden(mesh: &Mesh, neighbours: &Neighbours, kinds: &[Kind]) -> Border {
+        let hidden = (0..kinds.len()).filter(|c| kinds[*c] == Kind::Hidden);
+        Border::of(mesh, neighbours, hidden, &[OUTSIDE, WALL])
+    }
+
+    /// The faces of cells behind which is one of `ends`.
+    fn of(
+        mesh: &Mesh,
+        neighbours: &Neighbours,
+        cells: impl Iterator<Item = usize>,
+        ends: &[u32],
+    ) -> Border {
+        let (mut faces, mut rings): (Vec<Face>, Vec<u32>) = (Vec::new(), Vec::new());
+        let open = |b: &u32| ends.contains(b);
+        for cell in cells {
             let beyond = neighbours.of_cell(cell);
-            let open = |b: &u32| [OUTSIDE, WALL, HIDDEN].contains(b);
-            if matches!(kind, Kind::Hidden | Kind::LeftOut) || !beyond.iter().any(open) {
+            if !beyond.iter().any(open) {
                 continue;
             }
             let corners = mesh.corners(cell);
@@ -81,60 +84,13 @@ impl Border {
                 number += 1;
             });
         }
-        let mut border =
-            Border { order: (0..faces.len() as u32).collect(), faces, rings, nodes: Vec::new() };
-        border.build(mesh);
-        border
-    }
-
-    /// Splits the faces in halves along the longest side of their middles' box.
-    fn build(&mut self, mesh: &Mesh) {
-        let boxes: Vec<(DVec3, DVec3)> = (0..self.faces.len())
-            .map(|face| {
-                let ring = self.face(face).1.iter().map(|&i| mesh.point(i as usize));
-                ring.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| (l.min(p), h.max(p)))
-            })
-            .collect();
-        if boxes.is_empty() {
-            return;
-        }
-        let nothing = Node { low: DVec3::ZERO, high: DVec3::ZERO, first: 0, count: 0 };
-        self.nodes.push(nothing);
-        let mut open = vec![(0usize, 0usize, self.faces.len())];
-        while let Some((node, first, end)) = open.pop() {
-            let faces = &mut self.order[first..end];
-            let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-            let (mut low_middle, mut high_middle) = (low, high);
-            for &face in faces.iter() {
-                let (l, h) = boxes[face as usize];
-                (low, high) = (low.min(l), high.max(h));
-                (low_middle, high_middle) = (low_middle.min(l + h), high_middle.max(l + h));
-            }
-            // A box without thickness is a plane; rounding must not let a line pass it.
-            let margin = DVec3::splat(1e-9 * (high - low).max_element())
-                + 4.0 * f64::EPSILON * low.abs().max(high.abs());
-            let (mut of_node, count) = ((first as u32, faces.len() as u32), faces.len());
-            if count > IN_LEAF {
-                let size = high_middle - low_middle;
-                let axis = if size.x >= size.y && size.x >= size.z {
-                    0
-                } else {
-                    1 + usize::from(size.z > size.y)
-                };
-                let key =
-                    |face: &u32| boxes[*face as usize].0[axis] + boxes[*face as usize].1[axis];
-                faces.select_nth_unstable_by(count / 2, |a, b| {
-                    key(a).total_cmp(&key(b)).then(a.cmp(b))
-                });
-                of_node = (self.nodes.len() as u32, 0);
-                let left = self.nodes.len();
-                self.nodes.extend([nothing; 2]);
-                open.push((left, first, first + count / 2));
-                open.push((left + 1, first + count / 2, end));
-            }
-            let (low, high) = (low - margin, high + margin);
-            self.nodes[node] = Node { low, high, first: of_node.0, count: of_node.1 };
-        }
+        let box_of = |f: &Face| {
+            let ring = rings[f.first..f.first + f.count as usize].iter();
+            let places = ring.map(|&i| mesh.point(i as usize));
+            places.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| (l.min(p), h.max(p)))
+        };
+        let boxes: Vec<(DVec3, DVec3)> = faces.iter().map(box_of).collect();
+        Border { tree: FaceTree::of(&boxes), faces, rings }
     }
 
     pub(super) fn len(&self) -> usize {
@@ -158,30 +114,10 @@ impl Border {
         slack: f64,
     ) -> Option<Passage> {
         let mut best: Option<Passage> = None;
-        let mut stack = Vec::with_capacity(64);
-        stack.extend((!self.nodes.is_empty()).then_some(0u32));
-        let inverse = direction.recip();
-        while let Some(number) = stack.pop() {
-            let node = &self.nodes[number as usize];
-            let reach = best.map_or(most, |b| b.distance);
-            if !meets(node, at, inverse, -slack, reach) {
-                continue;
-            }
-            if node.count == 0 {
-                // The nearer child is looked at first.
-                let middle = |n: u32| {
-                    let n = &self.nodes[n as usize];
-                    (n.low + n.high).dot(direction)
-                };
-                let (left, right) = (node.first, node.first + 1);
-                let near_first = middle(left) <= middle(right);
-                stack.extend(if near_first { [right, left] } else { [left, right] });
-                continue;
-            }
-            for &face in &self.order[node.first as usize..(node.first + node.count) as usize] {
-                self.pass(mesh, face, at, direction, most, slack, &mut best);
-            }
-        }
+        self.tree.on_line(at, direction, [-slack, most], |face| {
+            self.pass(mesh, face, at, direction, most, slack, &mut best);
+            best.map_or(most, |b| b.distance)
+        });
         best
     }
 
@@ -224,18 +160,6 @@ impl Border {
             }
         });
     }
-}
-
-/// Whether a line meets a box between two distances.
-fn meets(node: &Node, at: DVec3, inverse: DVec3, from: f64, to: f64) -> bool {
-    let (mut near, mut far) = (from, to);
-    for a in 0..3 {
-        // In the plane of a side, 0 · ∞ is NaN, which `min` and `max` leave out.
-        let (s, t) = ((node.low[a] - at[a]) * inverse[a], (node.high[a] - at[a]) * inverse[a]);
-        near = near.max(s.min(t));
-        far = far.min(s.max(t));
-    }
-    near <= far
 }
 
 /// The sum of the normals of a ring's triangles (Newell), and its middle.

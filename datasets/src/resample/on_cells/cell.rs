@@ -2,9 +2,9 @@
 
 use super::blend::{Corner, Degree, Polynomials};
 use super::border::{each_triangle, line_through, normal_and_middle};
-use super::faces::NO_FACE;
 use super::shares::Map;
 use super::{CellField, Kind};
+use crate::resample::mesh::NO_FACE;
 use glam::DVec3;
 
 /// Corners this far off the plane of a face, as a part of the cell's size, leave it plane, and

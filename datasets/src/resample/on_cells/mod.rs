@@ -20,29 +20,26 @@
 //! line leaves one at its border and enters the other at its own.
 
 mod blend;
+mod bodies;
 mod border;
 mod cell;
-mod faces;
 mod shares;
 #[cfg(test)]
 mod tests;
 mod walker;
 
-pub(super) use faces::{Neighbours, OUTSIDE};
 pub use walker::{Beyond, CellWalker, Entry};
 
-use super::mesh::{Corners, Mesh};
-use super::reconstruct::{Expansion, FitQuality, PointField, Reconstruction, first_at_place};
+use super::mesh::{Corners, Mesh, Neighbours, Topology};
+use super::reconstruct::{Expansion, FitQuality, PointField, Reconstruction};
 use super::shape;
+use super::walls::Walls;
 use super::{ResampleError, Samples};
 use blend::Degree;
+use bodies::Bodies;
 use border::Border;
 use glam::DVec3;
 use rayon::prelude::*;
-
-/// A cell with less volume than this part of the cube of its box's diagonal has none. Cells at
-/// walls are 1e5 times as wide as high.
-const LEAST_VOLUME: f64 = 1e-15;
 
 /// What a cell holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -95,6 +92,9 @@ pub struct CellField {
     kinds: Vec<Kind>,
     neighbours: Neighbours,
     border: Border,
+    /// The faces of hidden cells at the border of the mesh.
+    hidden: Border,
+    bodies: Option<Bodies>,
     report: CellReport,
 }
 
@@ -143,14 +143,6 @@ impl CellReport {
     }
 }
 
-/// Sums of one cell.
-#[derive(Debug, Clone, Copy)]
-struct Shape {
-    kind: Kind,
-    folded: bool,
-    volume: f64,
-}
-
 impl CellField {
     /// The values of a mesh, and what gradients need. The result does not depend on the number of
     /// threads.
@@ -162,19 +154,20 @@ impl CellField {
         samples: Samples<'_>,
         reconstruction: Reconstruction,
     ) -> Result<CellField, ResampleError> {
-        CellField::with_walls(mesh, samples, reconstruction, &[])
+        CellField::with_walls(mesh, samples, reconstruction, &Walls::default())
     }
 
-    /// As [`CellField::new`], for a mesh whose walls are known, by a flag for each point
-    /// ([`super::Walls::of_points`]): behind them lines meet [`Beyond::Wall`].
+    /// As [`CellField::new`], for a mesh whose walls are known: behind them lines meet
+    /// [`Beyond::Wall`], and [`CellWalker::passes_body`] knows the bodies. Walls of another mesh
+    /// are none.
     ///
     /// # Errors
     /// As [`CellField::new`].
     pub fn with_walls(
-        mesh: Mesh,
+        mut mesh: Mesh,
         samples: Samples<'_>,
         reconstruction: Reconstruction,
-        wall_points: &[bool],
+        walls: &Walls,
     ) -> Result<CellField, ResampleError> {
         super::check_count(&mesh, samples)?;
         let averaged;
@@ -195,20 +188,19 @@ impl CellField {
             of_cells.is_none_or(|v| v[cell].is_finite())
                 && ids.iter().all(|&id| values[id as usize].is_finite())
         };
-        let shapes: Vec<Shape> = (0..mesh.num_cells())
-            .into_par_iter()
-            .map(|cell| {
-                let corners = mesh.corners(cell);
-                let mut shape = shape_of(&mesh, &corners);
-                if shape.kind == Kind::Gas && mesh.is_hidden(cell) {
-                    shape.kind = Kind::Hidden;
-                } else if shape.kind == Kind::Gas && !has_value(cell, &corners.ids) {
-                    shape.kind = Kind::NoValue;
-                }
-                shape
-            })
-            .collect();
-        let kinds: Vec<Kind> = shapes.iter().map(|s| s.kind).collect();
+        let Topology { volumes, mut neighbours } = mesh.take_topology();
+        let kind_and_fold = |cell: usize| {
+            let corners = mesh.corners(cell);
+            let kind = match volumes[cell] {
+                0.0 => Kind::LeftOut,
+                _ if mesh.is_hidden(cell) => Kind::Hidden,
+                _ if has_value(cell, &corners.ids) => Kind::Gas,
+                _ => Kind::NoValue,
+            };
+            (kind, kind == Kind::Gas && is_folded(&mesh, &corners))
+        };
+        let (kinds, folded): (Vec<Kind>, Vec<bool>) =
+            (0..mesh.num_cells()).into_par_iter().map(kind_and_fold).unzip();
         let of = |kind: Kind| kinds.iter().filter(|k| **k == kind).count();
         let cells = of(Kind::Gas);
         if cells == 0 {
@@ -218,25 +210,37 @@ impl CellField {
                 cure: "check that the arrays hold finite numbers and the cells have volume",
             });
         }
-        let mut neighbours = Neighbours::of(&mesh, &first_at_place(&mesh), &kinds);
-        neighbours.mark_walls(&mesh, wall_points);
-        let border = Border::of(&mesh, &neighbours, &kinds);
+        neighbours.mark_walls(walls.of_cells());
+        let border = Border::of_gas(&mesh, &neighbours, &kinds);
+        let hidden = Border::of_hidden(&mesh, &neighbours, &kinds);
+        let bodies = Bodies::of(&mesh, walls);
         let (low, high) = mesh.bounds();
-        let gas = shapes.iter().filter(|s| s.kind == Kind::Gas);
+        let of_gas = volumes.iter().zip(&kinds).filter(|(_, kind)| **kind == Kind::Gas);
+        let volume: f64 = of_gas.map(|(volume, _)| volume).sum();
         let report = CellReport {
             cells,
             without_value: of(Kind::NoValue),
             hidden: of(Kind::Hidden),
             left_out: mesh.left_out() + of(Kind::LeftOut),
-            folded: gas.clone().filter(|s| s.folded).count(),
+            folded: folded.iter().filter(|f| **f).count(),
             straightened: mesh.higher_order(),
             crowded_faces: neighbours.crowded(),
             border_faces: border.len(),
-            filled: gas.map(|s| s.volume).sum::<f64>() / (high - low).element_product(),
+            filled: volume / (high - low).element_product(),
             fit,
         };
         let values = values.to_vec();
-        Ok(CellField { mesh, values, expansions, kinds, neighbours, border, report })
+        Ok(CellField {
+            mesh,
+            values,
+            expansions,
+            kinds,
+            neighbours,
+            border,
+            hidden,
+            bodies,
+            report,
+        })
     }
 
     /// What the cells are, and what was repaired.
@@ -312,7 +316,7 @@ impl CellField {
         let of_cell = |cell: usize| {
             let corners = self.mesh.corners(cell);
             let sum: f64 = corners.ids.iter().map(|&i| self.values[i as usize]).sum();
-            (sum / corners.ids.len() as f64, shape_of(&self.mesh, &corners).volume)
+            (sum / corners.ids.len() as f64, self.mesh.volume(&corners))
         };
         let gas = (0..self.mesh.num_cells()).into_par_iter();
         weighted_median(gas.filter(|&c| self.kinds[c] == Kind::Gas).map(of_cell).collect())
@@ -339,30 +343,8 @@ fn weighted_median(mut pairs: Vec<(f64, f64)>) -> Option<f64> {
     middle.or(pairs.last()).map(|p| p.0)
 }
 
-/// Whether a cell has volume, by the tetrahedra between its middle, the middles of its faces and
-/// its edges, and whether it folds.
-fn shape_of(mesh: &Mesh, corners: &Corners) -> Shape {
+/// Whether the map of a cell folds.
+fn is_folded(mesh: &Mesh, corners: &Corners) -> bool {
     let points: Vec<DVec3> = corners.ids.iter().map(|&i| mesh.point(i as usize)).collect();
-    let left_out = Shape { kind: Kind::LeftOut, folded: false, volume: 0.0 };
-    if points.len() < 4 || !points.iter().all(|p| p.is_finite()) {
-        return left_out;
-    }
-    let (low, high) =
-        points.iter().fold((points[0], points[0]), |(l, h), p| (l.min(*p), h.max(*p)));
-    let middle = points.iter().sum::<DVec3>() / points.len() as f64;
-    let mut volume = 0.0;
-    corners.shape.each_face(|face| {
-        let place = |i: u32| points[i as usize] - middle;
-        let on_face = face.iter().map(|&i| place(i)).sum::<DVec3>() / face.len() as f64;
-        for (n, &i) in face.iter().enumerate() {
-            let next = place(face[(n + 1) % face.len()]);
-            volume += on_face.cross(place(i)).dot(next).abs() / 6.0;
-        }
-    });
-    let diagonal = (high - low).length();
-    if volume.is_nan() || volume <= LEAST_VOLUME * diagonal.powi(3) {
-        return left_out;
-    }
-    let folded = shape::Cell::new(&points, &corners.shape).is_folded();
-    Shape { kind: Kind::Gas, folded, volume }
+    shape::Cell::new(&points, &corners.shape).is_folded()
 }

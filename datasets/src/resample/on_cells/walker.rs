@@ -3,8 +3,8 @@
 use super::CellField;
 use super::blend::{Degree, Share};
 use super::cell::PreparedCell;
-use super::faces::{HIDDEN, OUTSIDE, WALL};
 use super::shares::shares;
+use crate::resample::mesh::{HIDDEN, OUTSIDE, WALL};
 use glam::DVec3;
 
 /// Places for prepared cells: a power of two. Rays that are near each other pass the same cells,
@@ -156,6 +156,21 @@ impl<'a> CellWalker<'a> {
         };
         let (distance, beyond) = self.prepared(cell).way_out(at, direction, from)?;
         Some((distance, Beyond::of(beyond)))
+    }
+
+    /// Whether the line from `at` in `direction`, of length one, is in a body somewhere within
+    /// `most`, where it is outside all cells. No face tells of a body that fills the span of the
+    /// mesh, along which the line runs. False where the walls of the mesh are not known.
+    pub fn passes_body(&self, at: DVec3, direction: DVec3, most: f64) -> bool {
+        let CellField { mesh, bodies, .. } = self.field;
+        bodies.as_ref().is_some_and(|b| b.meet(mesh, at, direction, most))
+    }
+
+    /// Whether the line passes the border of the mesh at a hidden cell within `most`. `slack` is
+    /// how far `at` may be beyond that border.
+    pub fn passes_hidden(&self, at: DVec3, direction: DVec3, most: f64, slack: f64) -> bool {
+        let CellField { mesh, hidden, .. } = self.field;
+        hidden.first_passage(mesh, at, direction, most, slack).is_some()
     }
 
     /// A cell that a place is in, of those that are near a cell: its neighbours, and theirs.

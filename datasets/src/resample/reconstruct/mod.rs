@@ -22,7 +22,6 @@ mod neighbours;
 mod polynomial;
 
 pub(super) use expansion::Expansion;
-pub(super) use neighbours::first_at_place;
 pub(super) use polynomial::TERMS;
 
 use super::mesh::Mesh;

@@ -4,7 +4,6 @@ use super::cell_moments::CellMoments;
 use crate::resample::mesh::Mesh;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
-use std::collections::HashMap;
 
 /// Which points belong to which cells. Points of different blocks at the same place are one.
 pub(super) struct Incidence {
@@ -26,22 +25,10 @@ impl Rows {
     }
 }
 
-/// For each point the first of those at the same place.
-pub(in crate::resample) fn first_at_place(mesh: &Mesh) -> Vec<u32> {
-    let mut first: HashMap<[u64; 3], u32> = HashMap::with_capacity(mesh.num_points());
-    (0..mesh.num_points())
-        .map(|i| {
-            // Adding zero makes -0 the same place as 0.
-            let place = mesh.point(i).to_array().map(|x| (x + 0.0).to_bits());
-            *first.entry(place).or_insert(i as u32)
-        })
-        .collect()
-}
-
 impl Incidence {
     /// Hidden cells are left out: their values are not those of the flow.
     pub(super) fn of(mesh: &Mesh) -> Incidence {
-        let same = first_at_place(mesh);
+        let same = mesh.first_at_place().to_vec();
         let of_cell = |cell: usize| {
             let ids = if mesh.is_hidden(cell) { vec![] } else { mesh.corners(cell).ids };
             ids.into_iter().map(|id| same[id as usize]).collect::<Vec<u32>>()

@@ -3,20 +3,20 @@
 //! Faces are compared by their points, as in `boundary_faces` of the model. Points of different
 //! blocks at the same place are one, so that a face of two blocks is none of the border.
 
-use super::Kind;
-use crate::resample::mesh::Mesh;
+use super::Mesh;
 use rayon::prelude::*;
 
 /// Behind the face is no cell.
 pub(in crate::resample) const OUTSIDE: u32 = u32::MAX;
 /// Behind the face is a cell that the solver hides.
-pub(super) const HIDDEN: u32 = u32::MAX - 1;
+pub(in crate::resample) const HIDDEN: u32 = u32::MAX - 1;
 /// Behind the face is a body.
-pub(super) const WALL: u32 = u32::MAX - 2;
+pub(in crate::resample) const WALL: u32 = u32::MAX - 2;
 /// The face has no area: a side that collapsed.
-pub(super) const NO_FACE: u32 = u32::MAX - 3;
+pub(in crate::resample) const NO_FACE: u32 = u32::MAX - 3;
 
 /// The cell behind each face.
+#[derive(Debug, Clone)]
 pub(in crate::resample) struct Neighbours {
     /// Number of the first face of each cell.
     starts: Vec<usize>,
@@ -30,8 +30,8 @@ pub(in crate::resample) struct Neighbours {
 type FaceKey = (u32, [u32; 4]);
 
 impl Neighbours {
-    /// `same` is the first of the points at the same place.
-    pub(in crate::resample) fn of(mesh: &Mesh, same: &[u32], kinds: &[Kind]) -> Neighbours {
+    /// `same` is the first of the points at the same place. Cells without volume are left out.
+    pub(in crate::resample) fn of(mesh: &Mesh, same: &[u32], volumes: &[f64]) -> Neighbours {
         let per_cell: Vec<u32> = (0..mesh.num_cells())
             .into_par_iter()
             .map(|cell| {
@@ -47,7 +47,7 @@ impl Neighbours {
         }));
         let keys_of = |cell: usize| {
             let mut keys: Vec<(FaceKey, u32, usize)> = Vec::new();
-            if kinds[cell] == Kind::LeftOut {
+            if volumes[cell] == 0.0 {
                 return keys;
             }
             let corners = mesh.corners(cell);
@@ -74,10 +74,8 @@ impl Neighbours {
         for shared in keys.chunk_by(|a, b| a.0 == b.0) {
             match shared {
                 [(_, a, face_a), (_, b, face_b)] if a != b => {
-                    let seen = |cell: u32| match kinds[cell as usize] {
-                        Kind::Hidden => HIDDEN,
-                        _ => cell,
-                    };
+                    let seen =
+                        |cell: u32| if mesh.is_hidden(cell as usize) { HIDDEN } else { cell };
                     (beyond[*face_a], beyond[*face_b]) = (seen(*b), seen(*a));
                 }
                 all => {
@@ -89,24 +87,16 @@ impl Neighbours {
         Neighbours { starts, beyond, crowded }
     }
 
-    /// Takes those faces of the border whose corners are all points of walls as walls.
-    pub(super) fn mark_walls(&mut self, mesh: &Mesh, wall_points: &[bool]) {
-        for cell in 0..mesh.num_cells() {
-            let beyond = &mut self.beyond[self.starts[cell]..self.starts[cell + 1]];
-            if !beyond.contains(&OUTSIDE) {
-                continue;
+    /// Takes faces of the border as walls, each the face of this number of this cell. Faces that
+    /// are not of the border stay.
+    pub(in crate::resample) fn mark_walls(&mut self, walls: impl Iterator<Item = (u32, u32)>) {
+        for (cell, number) in walls {
+            let first = self.starts.get(cell as usize).copied().unwrap_or(self.beyond.len());
+            if let Some(beyond) = self.beyond.get_mut(first + number as usize)
+                && *beyond == OUTSIDE
+            {
+                *beyond = WALL;
             }
-            let corners = mesh.corners(cell);
-            let mut number = 0;
-            corners.shape.each_face(|ring| {
-                let is_wall = |&i: &u32| {
-                    wall_points.get(corners.ids[i as usize] as usize).is_some_and(|w| *w)
-                };
-                if beyond[number] == OUTSIDE && ring.iter().all(is_wall) {
-                    beyond[number] = WALL;
-                }
-                number += 1;
-            });
         }
     }
 
@@ -116,7 +106,7 @@ impl Neighbours {
     }
 
     /// Number of faces that more than two cells have.
-    pub(super) fn crowded(&self) -> usize {
+    pub(in crate::resample) fn crowded(&self) -> usize {
         self.crowded
     }
 }

@@ -1,0 +1,85 @@
+//! Bodies in meshes of flows: light is stopped by them in a lattice and on cells alike, also where
+//! it meets none of their walls.
+
+mod outlines;
+
+use datasets::model::Dataset;
+use glam::DVec3;
+use outlines::{Plane, hide, options, statuses};
+use schlieren::input::Outside;
+use schlieren::path::Status::{Blocked, Free};
+
+/// Places in the cylinder, in the gas, in a corner of the box, and beside the box.
+const PLACES: [[f64; 2]; 8] = [
+    [0.0, 0.0],
+    [0.2, -0.31],
+    [0.44, 0.0],
+    [0.6, 0.0],
+    [-0.9, 1.1],
+    [1.5, 0.7],
+    [1.7, 1.75],
+    [2.5, 0.0],
+];
+
+#[test]
+fn a_body_through_the_whole_span_is_black_on_cells_as_in_a_lattice() {
+    let is_wall = |[x, y]: [f64; 2]| x.hypot(y) < 0.6;
+    // Straight along the span, and so that light runs past the walls of the cylinder's middle.
+    for direction in [DVec3::Z, DVec3::new(0.05, -0.03, 1.0)] {
+        for square in [true, false] {
+            let plane = Plane::default().around_cylinder([0.0, 1.0], square);
+            for (name, data) in [
+                ("a plane with a span", plane.flat(None)),
+                ("one cell thick, with a list of walls", plane.with_list(1, is_wall)),
+                ("six cells thick, with a list of walls", plane.with_list(6, is_wall)),
+            ] {
+                let of = |outside| statuses(&data, &options(&data, outside), direction, &PLACES);
+                let expected = [Blocked, Blocked, Blocked, Free, Free, Free, Free, Free];
+                assert_eq!(of(Outside::Auto), [expected; 2], "{name}, {direction} {square}");
+                // The option is above what the walls say.
+                assert_eq!(of(Outside::Gas), [[Free; 8]; 2], "{name}, {direction} {square}");
+            }
+        }
+    }
+}
+
+#[test]
+fn hidden_cells_through_the_whole_span_are_black_on_cells_as_in_a_lattice() {
+    let square = |u: f64, v: f64| [4.0 * u - 2.0, 4.0 * v - 2.0];
+    let plane = Plane::default().with_block([40, 40], square);
+    for layers in [1, 5] {
+        let mut grid = plane.thick(layers, None);
+        hide(&mut grid, |[x, y]| x.hypot(y) < 0.6);
+        let data = Dataset::UnstructuredGrid(grid);
+        let found = statuses(&data, &options(&data, Outside::Auto), DVec3::Z, &PLACES);
+        let expected = [Blocked, Blocked, Blocked, Free, Free, Free, Free, Free];
+        // In a lattice, nodes of the gas beside hidden ones are hidden as well.
+        assert_eq!(found[0][..3], expected[..3], "{layers}");
+        assert_eq!(found[0][4..], expected[4..], "{layers}");
+        assert_eq!(found[1][..3], expected[..3], "{layers}");
+        assert_eq!(found[1][4..], expected[4..], "{layers}");
+    }
+}
+
+#[test]
+fn pictures_of_a_body_through_the_span_agree_beyond_the_nodes_at_its_outline() {
+    let is_wall = |[x, y]: [f64; 2]| x.hypot(y) < 0.6;
+    let data = Plane::default().around_cylinder([0.0, 1.0], false).with_list(1, is_wall);
+    let n = 60;
+    let at = |i: usize| 4.2 * ((i as f64 + 0.43) / n as f64 - 0.5);
+    let places: Vec<[f64; 2]> = (0..n * n).map(|i| [at(i % n), at(i / n)]).collect();
+    let [cells, lattice] = statuses(&data, &options(&data, Outside::Auto), DVec3::Z, &places);
+    let (mut black, mut seen) = (0, 0);
+    for ((place, cells), lattice) in places.iter().zip(&cells).zip(&lattice) {
+        let r = place[0].hypot(place[1]);
+        // Two nodes of 0.05 each way.
+        if (r - 0.5).abs() < 0.1 {
+            continue;
+        }
+        let expected = if r < 0.5 { Blocked } else { Free };
+        assert_eq!((cells, lattice), (&expected, &expected), "{place:?}");
+        seen += 1;
+        black += usize::from(r < 0.5);
+    }
+    assert!(black > 80 && seen > 3000, "{black} of {seen}");
+}
