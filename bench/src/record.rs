@@ -192,29 +192,31 @@ impl Record {
         s
     }
 
-    /// Writes `ID.json`, `ID.csv` and `ID.IMAGE.png` into a directory, which is created if
-    /// necessary.
+    /// Writes `ID.json`, `ID.csv`, `ID.IMAGE.png` and the attachments into a directory, which is
+    /// created if necessary.
     pub fn write(&self, dir: &Path) -> anyhow::Result<PathBuf> {
+        let path = self.write_measurements(dir)?;
+        for p in &self.images {
+            write_file(dir, &self.image_file(p), &p.png)?;
+        }
+        Ok(path)
+    }
+
+    /// As [`Record::write`], without the images: they are megabytes, and the experiment makes them
+    /// again.
+    pub fn write_measurements(&self, dir: &Path) -> anyhow::Result<PathBuf> {
         std::fs::create_dir_all(dir).with_context(|| {
             format!(
                 "cannot make the directory `{}` for records; name another with --out",
                 dir.display()
             )
         })?;
-        let write = |name: String, bytes: &[u8]| {
-            let path = dir.join(name);
-            std::fs::write(&path, bytes)
-                .with_context(|| format!("cannot write `{}`", path.display()))
-        };
-        for p in &self.images {
-            write(self.image_file(p), &p.png)?;
-        }
         for a in &self.attachments {
-            write(format!("{}.{}", self.id, a.name), &a.bytes)?;
+            write_file(dir, &format!("{}.{}", self.id, a.name), &a.bytes)?;
         }
-        write(format!("{}.csv", self.id), self.to_csv().as_bytes())?;
+        write_file(dir, &format!("{}.csv", self.id), self.to_csv().as_bytes())?;
         let json = serde_json::to_string_pretty(self).context("cannot write the record as JSON")?;
-        write(format!("{}.json", self.id), json.as_bytes())?;
+        write_file(dir, &format!("{}.json", self.id), json.as_bytes())?;
         Ok(dir.join(format!("{}.json", self.id)))
     }
 
@@ -246,6 +248,11 @@ impl Record {
     fn image_file(&self, p: &RecordImage) -> String {
         format!("{}.{}.png", self.id, crate::machine::slug(&p.name))
     }
+}
+
+fn write_file(dir: &Path, name: &str, bytes: &[u8]) -> anyhow::Result<()> {
+    let path = dir.join(name);
+    std::fs::write(&path, bytes).with_context(|| format!("cannot write `{}`", path.display()))
 }
 
 /// All records of a directory, by name. JSON of other kinds (a Chrome trace, a program's output) is
@@ -331,6 +338,16 @@ mod tests {
         assert_eq!(Record::read(&path).unwrap(), r);
         assert_eq!(read_dir(dir.path()).unwrap(), vec![r]);
         assert!(dir.path().join("fig0.0.the-view.png").exists());
+    }
+
+    #[test]
+    fn records_to_keep_are_whole_but_for_their_images() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut r = sample();
+        let path = r.write_measurements(dir.path()).unwrap();
+        assert!(!dir.path().join("fig0.0.the-view.png").exists());
+        r.images[0].png.clear();
+        assert_eq!(Record::read(&path).unwrap(), r);
     }
 
     #[test]

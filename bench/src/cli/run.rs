@@ -26,11 +26,8 @@ pub(super) fn run(common: CommonArgs, args: &RunArgs) -> anyhow::Result<()> {
         return Err(UsageError(text.into()).into());
     }
     let dir = args.out.clone().unwrap_or_else(default_dir);
-    let mut dirs = vec![dir.clone()];
     let recording = args.record || args.record_despite_doubts;
-    if recording {
-        dirs.push(runs_dir()?);
-    }
+    let kept = if recording { Some(runs_dir()?) } else { None };
     let cancel = Cancel::on_ctrl_c()?;
     let mut gate = gate(args.record_despite_doubts, cancel);
     let steps = Steps::new(common, cancel, chosen.len());
@@ -58,9 +55,10 @@ pub(super) fn run(common: CommonArgs, args: &RunArgs) -> anyhow::Result<()> {
         if let Admission::Despite(why) = admission {
             record.recorded_despite = why;
         }
+        record.write(&dir)?;
         // An interrupted measurement is not kept among the permanent records.
-        for dir in &dirs[..if interrupted { 1 } else { dirs.len() }] {
-            record.write(dir)?;
+        if let Some(kept) = kept.as_ref().filter(|_| !interrupted) {
+            record.write_measurements(kept)?;
         }
         written = true;
         common.result(&record, || summary(&record))?;
