@@ -5,7 +5,6 @@
 #![cfg(feature = "panel")]
 
 #[path = "../../schlieren/tests/serving/browser.rs"]
-#[allow(dead_code, reason = "schlieren's tests drag and paint; this one does not")]
 mod browser;
 mod panel_common;
 
