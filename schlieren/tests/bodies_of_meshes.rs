@@ -83,3 +83,24 @@ fn pictures_of_a_body_through_the_span_agree_beyond_the_nodes_at_its_outline() {
     }
     assert!(black > 80 && seen > 3000, "{black} of {seen}");
 }
+
+#[test]
+fn a_grid_whose_seam_is_open_by_rounding_has_its_body() {
+    for single in [false, true] {
+        // sin 2π is not 0, and in single precision the ends are farther apart.
+        let plane = Plane::default().with_block([64, 12], |u, v| {
+            let (sin, cos) = (std::f64::consts::TAU * u).sin_cos();
+            let (sin32, cos32) = (std::f32::consts::TAU * u as f32).sin_cos();
+            let r = 0.5 + 1.5 * v;
+            if single { [r * f64::from(cos32), r * f64::from(sin32)] } else { [r * cos, r * sin] }
+        });
+        assert_eq!(plane.points.len(), 65 * 13, "the points of the seam are there twice");
+        let data = plane.flat(None);
+        let mut places = PLACES.to_vec();
+        places.extend([[0.9, 0.0], [1.4, 1e-9], [0.7, -1e-9]]);
+        let mut expected = vec![Free; places.len()];
+        expected[..3].fill(Blocked);
+        let of = |outside| statuses(&data, &options(&data, outside), DVec3::Z, &places);
+        assert_eq!(of(Outside::Auto), [expected.clone(), expected], "single: {single}");
+    }
+}

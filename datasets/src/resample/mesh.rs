@@ -3,6 +3,7 @@
 
 mod faces;
 mod layers;
+mod places;
 mod topology;
 
 use super::{ResampleError, extrude};

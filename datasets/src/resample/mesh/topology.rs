@@ -2,10 +2,9 @@
 //! when it is first asked for, and once for a mesh: reconstruction, walls and cells need it.
 
 use super::faces::Neighbours;
-use super::{Corners, Mesh};
+use super::{Corners, Mesh, places};
 use glam::DVec3;
 use rayon::prelude::*;
-use std::collections::HashMap;
 use std::sync::OnceLock;
 
 /// A cell with less volume than this part of the cube of its box's diagonal has none. Cells at
@@ -30,16 +29,7 @@ pub(in crate::resample) struct Topology {
 impl Mesh {
     /// For each point the first of those at the same place.
     pub(in crate::resample) fn first_at_place(&self) -> &[u32] {
-        self.computed.first_at_place.get_or_init(|| {
-            let mut first: HashMap<[u64; 3], u32> = HashMap::with_capacity(self.num_points());
-            (0..self.num_points())
-                .map(|i| {
-                    // Adding zero makes -0 the same place as 0.
-                    let place = self.point(i).to_array().map(|x| (x + 0.0).to_bits());
-                    *first.entry(place).or_insert(i as u32)
-                })
-                .collect()
-        })
+        self.computed.first_at_place.get_or_init(|| places::first_at_place(self))
     }
 
     /// The volumes and neighbours of the cells.

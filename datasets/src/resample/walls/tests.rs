@@ -14,7 +14,7 @@ fn cells(is_cell: impl Fn([usize; 3]) -> bool, is_apart: impl Fn([usize; 3]) -> 
         let at = [i % (N + 1), i / (N + 1) % (N + 1), i / (N + 1).pow(2)];
         at.map(|x| apart + x as f64 * (1.0 - apart / 3.0))
     };
-    let points = (0..2 * count).map(|i| place(i % count, if i < count { 0.0 } else { 1e-6 }));
+    let points = (0..2 * count).map(|i| place(i % count, if i < count { 0.0 } else { 1e-4 }));
     let mut grid = UnstructuredGrid { points: Points::F64(points.collect()), ..Default::default() };
     for c in 0..N.pow(3) {
         let at = [c % N, c / N % N, c / N / N];
