@@ -35,6 +35,9 @@ pub struct Mesh {
     computed: Computed,
 }
 
+/// A cell whose box is longer than this part of the mesh's is the only one along that axis.
+const WHOLE: f64 = 0.75;
+
 #[derive(Debug, Clone)]
 struct Part {
     /// Index into [`Dataset::leaves`].
@@ -396,9 +399,12 @@ impl Mesh {
     }
 
     /// Side of a cube with the volume of a typical cell's box: the median over at most 10 000
-    /// cells; NaN without cells.
+    /// cells; NaN without cells. Sides that are as long as the mesh, as those of a plane with
+    /// depth, do not count: their length says nothing of how fine the mesh is.
     pub fn typical_cell(&self) -> f64 {
         let step = (self.cells / 10_000).max(1);
+        let (low, high) = self.bounds();
+        let whole = WHOLE * (high - low);
         let side = |cell: usize| {
             let ids = self.corners(cell).ids;
             let nothing = (DVec3::INFINITY, DVec3::NEG_INFINITY);
@@ -406,7 +412,15 @@ impl Mesh {
                 .iter()
                 .map(|&i| self.points[i as usize])
                 .fold(nothing, |(l, h), p| (l.min(p), h.max(p)));
-            (high - low).element_product().cbrt()
+            let sides = high - low;
+            let counts = |axis: &usize| sides[*axis] < whole[*axis];
+            let (product, count) =
+                (0..3).filter(counts).fold((1.0, 0), |(p, n), axis| (p * sides[axis], n + 1));
+            if count == 0 {
+                sides.element_product().cbrt()
+            } else {
+                product.powf(1.0 / f64::from(count))
+            }
         };
         let mut sides: Vec<f64> =
             (0..self.cells).step_by(step).map(side).filter(|s| s.is_finite() && *s > 0.0).collect();

@@ -424,3 +424,21 @@ fn revolved_planes_are_round() {
             .unwrap();
     assert!(revolved_bounds(&below).unwrap_err().to_string().contains("radii from 0 on"));
 }
+
+#[test]
+fn the_depth_of_a_plane_says_nothing_of_the_size_of_its_cells() {
+    let points = (0..121).map(|i| [0.1 * f64::from(i % 11), 0.1 * f64::from(i / 11), 0.0]);
+    let grid = StructuredGrid {
+        extent: [0, 10, 0, 10, 0, 0],
+        points: Points::F64(points.collect()),
+        attributes: Attributes::default(),
+    };
+    for span in [0.001, 0.1, 5.0] {
+        let data = Dataset::StructuredGrid(grid.clone());
+        let mesh = Mesh::with_plane(&data, Plane::Extrude { span }).unwrap();
+        assert!((mesh.typical_cell() - 0.1).abs() < 1e-9, "{span}: {}", mesh.typical_cell());
+    }
+    // One cell has no other measure than its box.
+    let mesh = Mesh::new(&Dataset::StructuredGrid(annulus([2, 2, 2]))).unwrap();
+    assert!((mesh.typical_cell() - 4f64.cbrt()).abs() < 1e-9, "{}", mesh.typical_cell());
+}
