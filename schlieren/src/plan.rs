@@ -434,8 +434,8 @@ const RESOLUTION_STEP: f64 = 0.3;
 
 /// The spline's error by its difference from the polynomials. For eleven flows and three views
 /// (tests/plan.rs) it is 0.4 to 3.7 times the difference where the flow is resolved. For thirty
-/// gases on lattices and meshes (bench's accuracy-tolerance) it is up to 2.8 times, where nothing is
-/// left but the rounding of values to f32. Beyond that, neither interpolant is near the truth:
+/// gases on lattices and meshes (bench's accuracy-tolerance) it is up to 2.8 times, where nothing
+/// is left but the rounding of values to f32. Beyond that, neither interpolant is near the truth:
 /// across a jump from node to node, it is 1.3 to 7 times the difference, which then is more than a
 /// tenth of the largest deflection.
 const RESOLVED: f64 = 3.0;
