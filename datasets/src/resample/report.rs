@@ -83,6 +83,14 @@ impl Report {
 
     /// Warnings for the user, as sentences; empty when there are none.
     pub fn warnings(&self) -> Vec<String> {
+        self.warnings_with_cure(
+            "refine it, or average over more samples for each node (Options::samples_per_axis)",
+        )
+    }
+
+    /// As [`Report::warnings`], where what helps against a lattice that is too coarse has other
+    /// names.
+    pub fn warnings_with_cure(&self, finer: &str) -> Vec<String> {
         let mut out = Vec::new();
         let mut warn = |n: usize, text: &str| {
             if n > 0 {
@@ -98,8 +106,7 @@ impl Report {
         warn(self.not_finite, "nodes are in cells whose values are not finite");
         if 4 * self.missed_cells > self.cells {
             out.push(format!(
-                "{} of {} cells are finer than the lattice; refine it, or average over more samples \
-                 for each node",
+                "{} of {} cells are finer than the lattice; {finer}",
                 self.missed_cells, self.cells
             ));
         }

@@ -339,7 +339,10 @@ pub fn from_dataset(data: &Dataset, options: &Options) -> Result<LoadedField, In
     // Resample to a uniform lattice.
     let mut on = points.to_lattice(index, options)?;
     if let Some(r) = &on.report {
-        report.warnings.extend(r.warnings());
+        report.warnings.extend(r.warnings_with_cure(
+            "take more nodes (flow.resample_nodes), or average over more samples for each node \
+             (flow.resample_samples)",
+        ));
     }
     report.resampling = on.report;
     if options.average_jumps {

@@ -448,3 +448,24 @@ fn an_index_that_no_medium_has_is_refused_and_does_not_trace_for_ever() {
     let refused = from_dataset(&data, &Options::new(Medium::density("rho"))).unwrap_err();
     assert!(refused.to_string().contains("no medium has that"), "{refused}");
 }
+
+#[test]
+fn a_lattice_that_is_too_coarse_is_named_with_what_makes_it_finer() {
+    let layer = (0..60).map(|i| f64::from(i) * 1e-5);
+    let x: Vec<f64> = layer.chain([0.5, 1.0]).collect();
+    let n = x.len();
+    let axis = vec![0.0, 0.5, 1.0];
+    let data = Dataset::RectilinearGrid(RectilinearGrid {
+        extent: [0, n as i32 - 1, 0, 2, 0, 2],
+        coordinates: [x, axis.clone(), axis],
+        attributes: Attributes {
+            point: vec![DataArray::new("rho", 1, Values::F64(ramp(9 * n, 1.0, 1e-4)))],
+            ..Attributes::default()
+        },
+    });
+    let warnings = from_dataset(&data, &Options::new(Medium::density("rho"))).unwrap().report;
+    let warnings = warnings.warnings;
+    for cure in ["flow.resample_nodes", "flow.resample_samples"] {
+        assert!(warnings.iter().any(|w| w.contains(cure)), "{cure}: {warnings:?}");
+    }
+}
