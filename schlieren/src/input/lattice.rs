@@ -204,26 +204,29 @@ fn target(mesh: &Mesh, own: Option<&Lattice>, options: &Options) -> Result<Latti
             cure: "give the lower and the upper corner in the file's unit of length",
         });
     }
+    let across = match options.depth {
+        Some(Depth::Span(_)) => mesh.axis_of_depth(),
+        _ => None,
+    };
     // The thickness of a plane's cells is arbitrary, so the plane's own steps determine the
     // resolution.
     let typical = match options.depth {
         Some(_) => {
-            (high - low).truncate().element_product().sqrt() / (mesh.num_cells() as f64).sqrt()
+            let in_plane = (0..3).filter(|a| *a != across.unwrap_or(2));
+            let area: f64 = in_plane.map(|a| size[a]).product();
+            (area / mesh.num_cells() as f64).sqrt()
         }
         None => mesh.typical_cell(),
     };
-    let mut lattice = Lattice::fit(low, high, typical, options.resolution)?;
-    // A repeated flow needs no resolution along its span.
-    if let (Some(Depth::Span(span)), Resolution::Auto | Resolution::Longest(_)) =
-        (options.depth, options.resolution)
-    {
-        let size = high - low;
-        let along = (0..3).find(|&a| (size[a] - span).abs() <= 1e-9 * span);
-        if let Some(a) = along {
-            lattice.dims[a] = SPAN_NODES;
-            lattice.spacing[a] = size[a] / (SPAN_NODES - 1) as f64;
-        }
-    }
+    let (Some(a), Resolution::Auto | Resolution::Longest(_)) = (across, options.resolution) else {
+        return Ok(Lattice::fit(low, high, typical, options.resolution)?);
+    };
+    // A repeated flow needs no resolution along its span, which may be the longest of all.
+    let mut flat = high;
+    flat[a] = low[a] + size.min_element();
+    let mut lattice = Lattice::fit(low, flat, typical, options.resolution)?;
+    lattice.dims[a] = SPAN_NODES;
+    lattice.spacing[a] = size[a] / (SPAN_NODES - 1) as f64;
     Ok(lattice)
 }
 

@@ -469,3 +469,29 @@ fn a_lattice_that_is_too_coarse_is_named_with_what_makes_it_finer() {
         assert!(warnings.iter().any(|w| w.contains(cure)), "{cure}: {warnings:?}");
     }
 }
+
+#[test]
+fn a_span_takes_no_nodes_from_its_plane_however_long_it_is() {
+    for upright in [false, true] {
+        // The plane is 1 wide and 0.25 high, in x and y or in x and z.
+        let n = if upright { [81, 1, 21] } else { [81, 21, 1] };
+        let mut flat = image(n, vec![("rho", true, ramp(81 * 21, 1.0, 1e-4))]);
+        if let Dataset::ImageData(i) = &mut flat {
+            i.spacing = DVec3::splat(0.0125);
+        }
+        let dims = |span: f64| {
+            let depth = Some(Depth::Span(span));
+            let options = Options { depth, ..Options::new(Medium::density("rho")) };
+            let field = from_dataset(&flat, &options).unwrap().field;
+            let along = if upright { field.size_m().y } else { field.size_m().z };
+            assert!((along - span).abs() < 1e-9 * span, "{span}: {}", field.size_m());
+            field.dims()
+        };
+        let [nx, ny, nz] = dims(0.01);
+        assert!(nx >= 81 && (if upright { nz } else { ny }) >= 21, "{nx} {ny} {nz}");
+        // As long as the plane is high, as wide as it is, and longer.
+        for span in [0.25, 1.0, 40.0] {
+            assert_eq!(dims(span), [nx, ny, nz], "{span}, upright: {upright}");
+        }
+    }
+}

@@ -4,6 +4,9 @@ use super::{HIDDEN_CELL, HIDDEN_POINT, Mesh, PartKind};
 use crate::model::Attributes;
 use glam::DVec3;
 
+/// A direction is along an axis whose component is all of its length but for this part.
+const PLANE: f64 = 1e-12;
+
 impl Mesh {
     /// On which side of a plane that got depth a point lies; `None` for points of solid data.
     pub(in crate::resample) fn side_of_plane(&self, point: usize) -> Option<bool> {
@@ -13,6 +16,27 @@ impl Mesh {
             PartKind::Lattice(dims) => flat_source(local, *dims, axis).1 == 1,
             PartKind::Cells(_) => 2 * local >= part.points.len(),
         })
+    }
+
+    /// The axis along which a plane got its depth; `None` for solid data, and for a plane across no
+    /// axis.
+    pub fn axis_of_depth(&self) -> Option<usize> {
+        let mut found = None;
+        for part in &self.parts {
+            let axis = part.extruded?;
+            let to_copy = match &part.kind {
+                PartKind::Lattice(dims) => dims[..axis].iter().product(),
+                PartKind::Cells(_) => part.points.len() / 2,
+            };
+            let first = part.points.start;
+            let along = (*self.points.get(first + to_copy)? - *self.points.get(first)?).abs();
+            let of_part = (0..3).find(|&a| along[a] > (1.0 - PLANE) * along.length())?;
+            if found.is_some_and(|f| f != of_part) {
+                return None;
+            }
+            found = Some(of_part);
+        }
+        found
     }
 
     /// Calls `f` with the number of each leaf of the data, and the points of the mesh from it.
