@@ -451,20 +451,19 @@ fn an_index_that_no_medium_has_is_refused_and_does_not_trace_for_ever() {
 
 #[test]
 fn a_lattice_that_is_too_coarse_is_named_with_what_makes_it_finer() {
-    let layer = (0..60).map(|i| f64::from(i) * 1e-5);
-    let x: Vec<f64> = layer.chain([0.5, 1.0]).collect();
-    let n = x.len();
-    let axis = vec![0.0, 0.5, 1.0];
-    let data = Dataset::RectilinearGrid(RectilinearGrid {
-        extent: [0, n as i32 - 1, 0, 2, 0, 2],
-        coordinates: [x, axis.clone(), axis],
+    // Sixty-four cells along x, and nine nodes.
+    let place = |i: usize| [i % 65, i / 65 % 3, i / 65 / 3].map(|x| x as f64);
+    let data = Dataset::StructuredGrid(StructuredGrid {
+        extent: [0, 64, 0, 2, 0, 2],
+        points: Points::F64((0..9 * 65).map(place).collect()),
         attributes: Attributes {
-            point: vec![DataArray::new("rho", 1, Values::F64(ramp(9 * n, 1.0, 1e-4)))],
+            point: vec![DataArray::new("rho", 1, Values::F64(ramp(9 * 65, 1.0, 1e-4)))],
             ..Attributes::default()
         },
     });
-    let warnings = from_dataset(&data, &Options::new(Medium::density("rho"))).unwrap().report;
-    let warnings = warnings.warnings;
+    let resolution = Resolution::Dims([9, 2, 2]);
+    let options = Options { resolution, ..Options::new(Medium::density("rho")) };
+    let warnings = from_dataset(&data, &options).unwrap().report.warnings;
     for cure in ["flow.resample_nodes", "flow.resample_samples"] {
         assert!(warnings.iter().any(|w| w.contains(cure)), "{cure}: {warnings:?}");
     }
