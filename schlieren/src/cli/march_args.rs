@@ -39,6 +39,7 @@ pub(super) struct FrameArgs {
 }
 
 impl FrameArgs {
+    #[cfg(feature = "serve")]
     pub(super) fn is_given(&self) -> bool {
         self.size.is_some() || self.field_of_view.is_some()
     }

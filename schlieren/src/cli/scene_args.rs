@@ -153,6 +153,7 @@ fn no_effect(flag: &str, what: &str, name: &str, belongs: &str) -> UsageError {
 
 impl SceneArgs {
     /// Whether the options or the scene's file choose the frame.
+    #[cfg(feature = "serve")]
     pub(super) fn has_frame(&self) -> bool {
         self.scene.is_some() || self.frame.is_given()
     }
