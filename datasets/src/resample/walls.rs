@@ -13,7 +13,8 @@
 //! A list has all walls but holes. What is left is taken as open, and its share is reported: a
 //! slanting border of still gas and one of a ramp look alike.
 //!
-//! Faces in the sides of the box are windows, whatever they are of: nothing is behind them.
+//! Faces in the sides of the box are windows, whatever they are of: nothing is behind them. Those
+//! around the axis of a revolved flow are none: there are the corners of its box, and its middle.
 //!
 //! [`WALL_POINTS`]: crate::model::WALL_POINTS
 
@@ -43,7 +44,8 @@ pub struct Walls {
     undecided: f64,
 }
 
-/// A face of the border that does not lie in a side of the mesh's box.
+/// A face of the border behind which is something: it does not lie in a side of the mesh's box, or
+/// lies around the axis of a revolved flow.
 #[derive(Debug, Clone, Copy)]
 struct BorderFace {
     /// End of its corners.
@@ -67,6 +69,7 @@ impl Walls {
         }
         let sides = Sides::of(mesh, revolved);
         let velocity = if listed { None } else { Velocity::of(mesh, data) };
+        let mut around = Vec::new();
         for cell in 0..mesh.num_cells() {
             let beyond = neighbours.of_cell(cell);
             if !beyond.contains(&OUTSIDE) {
@@ -78,19 +81,27 @@ impl Walls {
                 let number = next;
                 next += 1;
                 let ids = || ring.iter().map(|&i| corners.ids[i as usize]);
-                if beyond[number] != OUTSIDE
-                    || sides.hold(mesh, ids())
-                    || is_face_of_plane(mesh, ids())
-                {
+                if beyond[number] != OUTSIDE || is_face_of_plane(mesh, ids()) {
                     return;
                 }
                 let is_wall = mesh.is_hidden(cell) || ids().all(|i| walls.of_points[i as usize]);
+                if sides.hold(mesh, ids()) {
+                    if sides.hold_around_axis(mesh, ids()) {
+                        around.push((ids().collect::<Vec<u32>>(), cell, number, is_wall));
+                    }
+                    return;
+                }
                 walls.rings.extend(ids());
                 let (end, cell, number) = (walls.rings.len(), cell as u32, number as u32);
                 walls.faces.push(BorderFace { end, cell, number, is_wall });
             });
         }
         walls.add_parts(&Parts::of(mesh, &walls, &sides, velocity.as_ref()), listed);
+        for (ring, cell, number, is_wall) in around {
+            walls.rings.extend(ring);
+            let (end, cell, number) = (walls.rings.len(), cell as u32, number as u32);
+            walls.faces.push(BorderFace { end, cell, number, is_wall });
+        }
         walls
     }
 

@@ -494,3 +494,20 @@ fn a_span_takes_no_nodes_from_its_plane_however_long_it_is() {
         }
     }
 }
+
+#[test]
+fn outside_a_revolved_flow_without_walls_is_gas() {
+    for low in [0.0, 0.5] {
+        let mut flat = image([33, 17, 1], vec![("rho", true, ramp(33 * 17, 1.0, 1e-4))]);
+        if let Dataset::ImageData(i) = &mut flat {
+            i.spacing = DVec3::splat(0.1);
+            i.origin.y = low;
+        }
+        let depth = Some(Depth::Revolve);
+        let options = Options { depth, ..Options::new(Medium::density("rho")) };
+        let loaded = from_dataset(&flat, &options).unwrap();
+        let outside = loaded.report.outside.expect("a cylinder leaves corners");
+        assert_eq!(outside.bodies_percent, Some(0.0), "{low}: {outside:?}");
+        assert!(outside.percent > 15.0, "{low}: {outside:?}");
+    }
+}

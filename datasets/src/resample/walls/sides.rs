@@ -61,6 +61,19 @@ impl Sides {
                 || x().all(|x| self.high[a] - x <= self.near[a])
         })
     }
+
+    /// Whether all corners of a face lie in the largest or in the least radius of a flow that will
+    /// be revolved.
+    pub(super) fn hold_around_axis(
+        &self,
+        mesh: &Mesh,
+        ids: impl Iterator<Item = u32> + Clone,
+    ) -> bool {
+        let y = || ids.clone().map(|i| mesh.point(i as usize).y);
+        self.revolved
+            && (y().all(|y| self.high.y - y <= self.near.y)
+                || self.low.y > self.near.y && y().all(|y| y - self.low.y <= self.near.y))
+    }
 }
 
 /// Whether a face is the polygon itself of a plane that got depth.
