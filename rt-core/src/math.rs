@@ -2,8 +2,10 @@
 //!
 //! Lengths are in the unit of the scene. No function has a tolerance of its own.
 
+mod nearest_of_triangle;
 mod split_mix;
 
+pub use nearest_of_triangle::{NearestOfTriangle, nearest_of_triangle};
 pub use split_mix::{SplitMix64, mix64};
 
 use glam::{DVec3, Vec3};

@@ -7,11 +7,12 @@
 //! more than the way, so that far from a body a step is half of the difference of the two
 //! distances.
 
-use super::border::{each_triangle, normal_and_middle};
+use super::border::each_triangle;
 use crate::resample::face_tree::FaceTree;
 use crate::resample::mesh::Mesh;
 use crate::resample::walls::Walls;
 use glam::DVec3;
+use rt_core::math::nearest_of_triangle;
 
 /// Steps along a line, at most; a body that is shorter along it may be missed.
 const MOST_STEPS: f64 = 256.0;
@@ -85,75 +86,14 @@ impl Faces {
     fn distance(&self, mesh: &Mesh, at: DVec3) -> f64 {
         let of_face = |face: u32| {
             let ring = self.ring(face as usize);
-            let places: Vec<DVec3> = ring.iter().map(|&i| mesh.point(i as usize) - at).collect();
-            let (_, middle) = normal_and_middle(&places);
+            let place = |i: usize| mesh.point(ring[i] as usize) - at;
+            let middle = (0..ring.len()).map(place).sum::<DVec3>() / ring.len() as f64;
             let mut best = f64::INFINITY;
-            each_triangle(
-                places.len(),
-                middle,
-                |i| places[i],
-                |triangle| best = best.min(distance2(triangle)),
-            );
+            each_triangle(ring.len(), middle, place, |triangle| {
+                best = best.min(nearest_of_triangle(triangle).distance2);
+            });
             best
         };
         self.tree.nearest2(at, of_face).sqrt()
-    }
-}
-
-/// Square of the distance of a triangle from the origin, by the part of its plane in which the
-/// origin lies (C. Ericson, Real-Time Collision Detection, 5.1.5). NaN where two corners are at one
-/// place and the third edge is nearest; its neighbours have that edge too.
-fn distance2([a, b, c]: [DVec3; 3]) -> f64 {
-    let (ab, ac) = (b - a, c - a);
-    let [d1, d2] = [-ab.dot(a), -ac.dot(a)];
-    if d1 <= 0.0 && d2 <= 0.0 {
-        return a.length_squared();
-    }
-    let [d3, d4] = [-ab.dot(b), -ac.dot(b)];
-    if d3 >= 0.0 && d4 <= d3 {
-        return b.length_squared();
-    }
-    let vc = d1 * d4 - d3 * d2;
-    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
-        return (a + ab * (d1 / (d1 - d3))).length_squared();
-    }
-    let [d5, d6] = [-ab.dot(c), -ac.dot(c)];
-    if d6 >= 0.0 && d5 <= d6 {
-        return c.length_squared();
-    }
-    let vb = d5 * d2 - d1 * d6;
-    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
-        return (a + ac * (d2 / (d2 - d6))).length_squared();
-    }
-    let va = d3 * d6 - d5 * d4;
-    if va <= 0.0 && d4 >= d3 && d5 >= d6 {
-        let along = (d4 - d3) / ((d4 - d3) + (d5 - d6));
-        return (b + (c - b) * along).length_squared();
-    }
-    let sum = va + vb + vc;
-    (a + ab * (vb / sum) + ac * (vc / sum)).length_squared()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_distance_of_a_triangle_is_that_of_its_nearest_place() {
-        let triangle = [DVec3::ZERO, DVec3::new(2.0, 0.0, 0.5), DVec3::new(0.3, 1.0, -0.2)];
-        let [a, b, c] = triangle;
-        for k in 0..343 {
-            let at = DVec3::new(f64::from(k % 7), f64::from(k / 7 % 7), f64::from(k / 49)) - 3.0;
-            let mut dense = f64::INFINITY;
-            for i in 0..=200 {
-                for j in 0..=200 - i {
-                    let place =
-                        a + (b - a) * (f64::from(i) / 200.0) + (c - a) * (f64::from(j) / 200.0);
-                    dense = dense.min(place.distance(at));
-                }
-            }
-            let exact = distance2(triangle.map(|p| p - at)).sqrt();
-            assert!(exact <= dense + 1e-12 && dense - exact < 0.02, "{at}: {exact} {dense}");
-        }
     }
 }

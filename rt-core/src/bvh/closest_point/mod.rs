@@ -5,7 +5,6 @@
 //! that rays see too.
 
 mod search;
-mod triangle;
 
 use super::blas::Content;
 use super::world::World;

@@ -1,7 +1,6 @@
 //! The search through the upper level and the entries' trees, nearest box first.
 
 use super::ClosestPoint;
-use super::triangle::nearest_of_triangle;
 use crate::bvh::Unit;
 use crate::bvh::compact::with_cache;
 use crate::bvh::entry::Entry;
@@ -10,6 +9,7 @@ use crate::bvh::instance_filter::InstanceFilter;
 use crate::bvh::layout::triangles::{leaf_floats, leaf_triangle_ids, row};
 use crate::bvh::layout::wide::{CHILD_ROW, ChildRef, NODE_UNITS, WIDTH};
 use crate::bvh::world::World;
+use crate::math::nearest_of_triangle;
 use fearless_simd::dispatch;
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 
