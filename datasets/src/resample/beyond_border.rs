@@ -49,7 +49,7 @@ pub fn in_bodies(
             *wall &= p.y.hypot(p.z) <= radius;
         }
     }
-    spread(lattice.dims, marks, &distance2, is_wall)
+    spread(lattice.dims, marks, &distance2, is_wall, mesh.num_hidden() > 0)
 }
 
 /// Places on a triangle at distances of at most half a node.
@@ -110,8 +110,15 @@ impl Nearest<'_> {
 }
 
 /// Gives the kind of the nodes beside the border to all others outside, layer by layer. Places that
-/// no face borders are behind hidden cells, and bodies.
-fn spread(dims: [usize; 3], marks: &[Mark], known2: &[f32], mut body: Vec<bool>) -> Vec<bool> {
+/// no face borders are behind hidden cells, and bodies; without such cells they are gas, for no
+/// wall is known there.
+fn spread(
+    dims: [usize; 3],
+    marks: &[Mark],
+    known2: &[f32],
+    mut body: Vec<bool>,
+    behind_hidden: bool,
+) -> Vec<bool> {
     let stride = [1, dims[0], dims[0] * dims[1]];
     let mut known: Vec<bool> = known2.iter().map(|d| d.is_finite()).collect();
     let mut queue: VecDeque<usize> = (0..marks.len()).filter(|&i| known[i]).collect();
@@ -129,7 +136,7 @@ fn spread(dims: [usize; 3], marks: &[Mark], known2: &[f32], mut body: Vec<bool>)
         }
     }
     for (i, b) in body.iter_mut().enumerate() {
-        *b = marks[i] == Mark::Outside && (*b || !known[i]);
+        *b = marks[i] == Mark::Outside && (*b || (behind_hidden && !known[i]));
     }
     body
 }
