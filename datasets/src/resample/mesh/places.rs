@@ -7,6 +7,7 @@
 
 use super::{Mesh, PartKind};
 use glam::DVec3;
+use rt_core::math::mix64;
 use std::collections::HashMap;
 
 /// Points of different cells that are nearer than these parts of the shortest and of the longest
@@ -16,29 +17,62 @@ const NEAR: [f64; 2] = [1e-3, 1e-5];
 
 /// For each point the first of those at the same place.
 pub(super) fn first_at_place(mesh: &Mesh) -> Vec<u32> {
-    let mut first: HashMap<[u64; 3], u32> = HashMap::with_capacity(mesh.num_points());
-    let mut same: Vec<u32> = (0..mesh.num_points())
-        .map(|i| {
-            // Adding zero makes -0 the same place as 0.
-            let place = mesh.point(i).to_array().map(|x| (x + 0.0).to_bits());
-            *first.entry(place).or_insert(i as u32)
-        })
-        .collect();
+    let border = on_border(mesh);
+    let mut first: HashMap<[u64; 3], u32> = HashMap::new();
+    let mut same: Vec<u32> = (0..mesh.num_points() as u32).collect();
+    for i in (0..same.len()).filter(|i| border[*i]) {
+        // Adding zero makes -0 the same place as 0.
+        let place = mesh.point(i).to_array().map(|x| (x + 0.0).to_bits());
+        same[i] = *first.entry(place).or_insert(i as u32);
+    }
     drop(first);
-    join_near(mesh, &reaches(mesh), &mut same);
+    join_near(mesh, &reaches(mesh, &border), &mut same);
     same
 }
 
-/// How far from each point another one is at its place. Zero for points of no cell, and within
-/// lattices, which have no seam there.
-fn reaches(mesh: &Mesh) -> Vec<f64> {
+/// Which points may have another one at their place: those of faces that no two cells have by the
+/// same points. A point that a file has twice is one, for the cells on either side of it have
+/// different points. Of several lattices every point is one, since a finer lattice may begin within
+/// a coarser one.
+fn on_border(mesh: &Mesh) -> Vec<bool> {
+    // Each face adds a hash, without carry, to its points. That of a face between two cells cancels
+    // itself, and no table of faces is needed.
+    let mut hashes = vec![0u64; mesh.num_points()];
+    for part in &mesh.parts {
+        match &part.kind {
+            PartKind::Lattice(dims) if mesh.parts.len() == 1 => {
+                each_at_sides(*dims, |_, point| hashes[part.points.start + point] = 1);
+            }
+            PartKind::Lattice(_) => hashes[part.points.clone()].fill(1),
+            PartKind::Cells(_) => {
+                for cell in part.cells.clone() {
+                    let corners = mesh.corners(cell);
+                    corners.shape.each_face(|ring| {
+                        let ids = || ring.iter().map(|i| corners.ids[*i as usize]);
+                        let sum = ids().fold(0u64, |s, id| s.wrapping_add(mix64(u64::from(id))));
+                        let hash = mix64(sum);
+                        ids().for_each(|id| hashes[id as usize] ^= hash);
+                    });
+                }
+            }
+        }
+    }
+    hashes.into_iter().map(|hash| hash != 0).collect()
+}
+
+/// How far from each point of the border another one is at its place. Zero for all others, and
+/// within lattices, which have no seam there.
+fn reaches(mesh: &Mesh, border: &[bool]) -> Vec<f64> {
     // The shortest and the longest edge.
     let mut edges = vec![[f64::INFINITY, 0.0f64]; mesh.num_points()];
     let mut add = |a: usize, b: usize| {
+        if !(border[a] || border[b]) {
+            return;
+        }
         let length = mesh.point(a).distance(mesh.point(b));
         // Sides that collapsed have edges without length.
         if length > 0.0 {
-            for i in [a, b] {
+            for i in [a, b].into_iter().filter(|i| border[*i]) {
                 edges[i] = [edges[i][0].min(length), edges[i][1].max(length)];
             }
         }
@@ -66,24 +100,29 @@ fn reaches(mesh: &Mesh) -> Vec<f64> {
 
 /// The edges of a lattice that end in its sides.
 fn edges_at_sides(dims: [usize; 3], first: usize, mut add: impl FnMut(usize, usize)) {
-    let [nx, ny, nz] = dims;
-    let step = [1, nx, nx * ny];
+    let step = [1, dims[0], dims[0] * dims[1]];
+    each_at_sides(dims, |at, point| {
+        let point = first + point;
+        for axis in 0..3 {
+            if at[axis] + 1 < dims[axis] {
+                add(point, point + step[axis]);
+            }
+            if at[axis] > 0 {
+                add(point - step[axis], point);
+            }
+        }
+    });
+}
+
+/// Calls `f` with the place in the lattice, and the number, of each point of its sides.
+fn each_at_sides([nx, ny, nz]: [usize; 3], mut f: impl FnMut([usize; 3], usize)) {
+    let inside = |at: usize, n: usize| at > 0 && at + 1 < n;
     for k in 0..nz {
         for j in 0..ny {
-            let inside = |at: usize, n: usize| at > 0 && at + 1 < n;
             let whole_row = !inside(j, ny) || !inside(k, nz);
             let mut i = 0;
             while i < nx {
-                let at = [i, j, k];
-                let point = first + i + nx * (j + ny * k);
-                for axis in 0..3 {
-                    if at[axis] + 1 < dims[axis] {
-                        add(point, point + step[axis]);
-                    }
-                    if at[axis] > 0 {
-                        add(point - step[axis], point);
-                    }
-                }
+                f([i, j, k], i + nx * (j + ny * k));
                 i += if whole_row || i + 1 == nx { 1 } else { nx - 1 };
             }
         }
