@@ -208,16 +208,7 @@ fn target(mesh: &Mesh, own: Option<&Lattice>, options: &Options) -> Result<Latti
         Some(Depth::Span(_)) => mesh.axis_of_depth(),
         _ => None,
     };
-    // The thickness of a plane's cells is arbitrary, so the plane's own steps determine the
-    // resolution.
-    let typical = match options.depth {
-        Some(_) => {
-            let in_plane = (0..3).filter(|a| *a != across.unwrap_or(2));
-            let area: f64 = in_plane.map(|a| size[a]).product();
-            (area / mesh.num_cells() as f64).sqrt()
-        }
-        None => mesh.typical_cell(),
-    };
+    let typical = mesh.typical_cell();
     let (Some(a), Resolution::Auto | Resolution::Longest(_)) = (across, options.resolution) else {
         return Ok(Lattice::fit(low, high, typical, options.resolution)?);
     };
