@@ -117,7 +117,7 @@ function triad({ x, y, width }) {
       context.lineWidth = wide;
       context.beginPath();
       if (size > 3) { context.moveTo(...at); context.lineTo(...end); }
-      // Seen from ahead: towards the viewer with a dot, away from him with a cross.
+      // Seen from ahead: towards the viewer with a dot, away from it with a cross.
       else {
         context.arc(...at, 5, 0, 7);
         const d = 3.5;

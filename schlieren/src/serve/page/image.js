@@ -59,7 +59,8 @@ export function interact(actions) {
     if (e.button !== 0 && !moves) return;
     canvas.setPointerCapture(e.pointerId);
     const tool = moves ? "pan" : actions.tool();
-    drag = { x: e.clientX, y: e.clientY, at: place(e), angles: actions.angles(), tool, moved: false };
+    const { clientX: x, clientY: y } = e;
+    drag = { x, y, at: place(e), angles: actions.angles(), tool, moved: false };
     if (moves) drag.pan = actions.pan();
     points = tool === "paint" ? [place(e)] : [];
     canvas.focus();
@@ -73,13 +74,15 @@ export function interact(actions) {
     const [dx, dy] = [(e.clientX - drag.x) / box.width, (e.clientY - drag.y) / box.height];
     switch (drag.tool) {
       case "paint":
-        for (const c of e.getCoalescedEvents?.().length ? e.getCoalescedEvents() : [e]) points.push(place(c));
+        points.push(...(e.getCoalescedEvents?.().length ? e.getCoalescedEvents() : [e]).map(place));
         if (points.length > 12) flush(true);
         return;
       case "profile": actions.line(drag.at, place(e)); return;
       case "pan": drag.pan(dx, dy); return;
-      // Dragging across the whole image is half a turn. The side near the camera follows the pointer.
-      default: actions.orbit(drag.angles[0] - 180 * dx, drag.angles[1] + 180 * (e.clientY - drag.y) / box.width);
+      // Dragging across the whole image is half a turn. The side near the camera follows the
+      // pointer.
+      default: actions.orbit(drag.angles[0] - 180 * dx,
+        drag.angles[1] + 180 * (e.clientY - drag.y) / box.width);
     }
   });
   const end = () => {
@@ -89,7 +92,11 @@ export function interact(actions) {
   };
   canvas.addEventListener("pointerup", end);
   canvas.addEventListener("pointercancel", end);
-  canvas.addEventListener("pointerleave", () => { next = pointer = null; here.textContent = ""; actions.mark(null, null); });
+  canvas.addEventListener("pointerleave", () => {
+    next = pointer = null;
+    here.textContent = "";
+    actions.mark(null, null);
+  });
   canvas.addEventListener("wheel", e => {
     e.preventDefault();
     // Lines or pages, where the mouse does not count in pixels.
@@ -99,7 +106,8 @@ export function interact(actions) {
   canvas.addEventListener("keydown", e => {
     if (e.ctrlKey || e.altKey || e.metaKey) return;
     const factor = { "+": 1 / 1.25, "=": 1 / 1.25, "-": 1.25 }[e.key];
-    const way = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[e.key];
+    const ways = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
+    const way = ways[e.key];
     if (!factor && !way && e.key !== "0") return;
     e.preventDefault();
     if (factor) actions.zoom(factor, [0.5, 0.5]);

@@ -87,7 +87,9 @@ function onFrame(frame) {
     ["light along", angles ? `azimuth ${Math.round(angles[0] * 10) / 10}°, elevation ${Math.round(angles[1] * 10) / 10}°` : "–"],
     ["march", info.march || "–"],
   ]);
-  $("warnings").replaceChildren(...(info.finished ? info.warnings : []).map(w => Object.assign(document.createElement("li"), { textContent: inWords(w) })));
+  const warnings = (info.finished ? info.warnings : []).map(w =>
+    Object.assign(document.createElement("li"), { textContent: inWords(w) }));
+  $("warnings").replaceChildren(...warnings);
   mark();
 }
 
@@ -109,6 +111,14 @@ function numbers(pairs) {
 // What the library's warnings name by keys and options, in the words of the page.
 const WORDS = [
   ["flow.resample_nodes, --resample", "“resample to”"],
+  ["flow.resample_nodes", "“resample to”"],
+  // These are chosen when the program starts.
+  ["flow.resample_samples", "--resample-samples at the start"],
+  ["flow.density_unit_kg_m3", "--density-unit at the start"],
+  ["flow.temperature_zero_k", "--temperature-zero at the start"],
+  ["flow.pressure_unit_pa", "--pressure-unit at the start"],
+  ["flow.pressure_zero_pa", "--pressure-zero at the start"],
+  ["flow.length_unit_m", "--length-unit at the start"],
   ["flow.smoothing_nodes, --smoothing", "“smoothing”"],
   ["march.tolerance_rad, --tolerance", "“tolerance”"],
   ["flow.outside", "“outside the mesh”"],
@@ -168,7 +178,8 @@ function frameNow() {
 function setFrame(next) {
   wanted = next;
   const digits = v => Number(v.toPrecision(6));
-  server.change({ film: { field_of_view_m: digits(next.width_m), center_m: next.center_m.map(digits) } });
+  const center_m = next.center_m.map(digits);
+  server.change({ film: { field_of_view_m: digits(next.width_m), center_m } });
 }
 
 const sides = ({ width_m }) => [width_m, width_m * info.height / info.width];
@@ -216,7 +227,12 @@ function setTool(next) {
   profile.setActive(next === "profile");
 }
 for (const input of document.querySelectorAll("input[name=tool]")) input.addEventListener("change", () => setTool(input.value));
-for (const button of document.querySelectorAll("[data-view]")) button.addEventListener("click", () => server.change({ view: { direction: button.dataset.view }, ...(state?.fit ? { fit: true } : {}) }));
+for (const button of document.querySelectorAll("[data-view]")) {
+  button.addEventListener("click", () => {
+    const view = { direction: button.dataset.view };
+    server.change({ view, ...(state?.fit ? { fit: true } : {}) });
+  });
+}
 $("whole").addEventListener("click", whole);
 $("step").addEventListener("input", () => server.change({ step: Number($("step").value) }));
 $("radius").addEventListener("input", () => { $("radius").dataset.touched = "1"; });

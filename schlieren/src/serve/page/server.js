@@ -38,7 +38,11 @@ export async function change(patch) {
     const next = waiting;
     waiting = null;
     try { onState(await call("scene", next)); onError(null); }
-    catch (e) { onError(e.message); try { onState(await call("state"), true); } catch { /* `frames` reports a lost connection */ } }
+    catch (e) {
+      onError(e.message);
+      try { onState(await call("state"), true); }
+      catch { /* `frames` reports a lost connection. */ }
+    }
   }
   busy = false;
 }

@@ -102,13 +102,15 @@ function lightRows(state) {
     rows.push(number("schlieren lens f₂", "m", 1, s => e(s).lenses.schlieren_m, v => ({ lenses: { schlieren_m: v } })));
   if (e(state).film.focus_m !== undefined)
     rows.push(number({ shadowgraph: "film distance", bos: "background at" }[kind] || "in focus at", "mm", 1e3, s => e(s).film.focus_m, v => ({ film: { focus_m: v } })));
-  rows.push(text("wavelengths", "nm", s => light(s).wavelengths_nm.join(", "), v => ({ light: { wavelengths_nm: numbers("wavelengths", v), weights: null } })));
+  rows.push(text("wavelengths", "nm", s => light(s).wavelengths_nm.join(", "),
+    v => ({ light: { wavelengths_nm: numbers("wavelengths", v), weights: null } })));
   return rows;
 }
 
 function filmRows(state) {
   const e = s => s.effective, film = s => e(s).film, rows = [];
-  rows.push(text("pixels", "", s => film(s).size.join(" × "), v => ({ film: { size: numbers("pixels", v) } })));
+  rows.push(text("pixels", "", s => film(s).size.join(" × "),
+    v => ({ film: { size: numbers("pixels", v) } })));
   rows.push(check("fit the flow", s => s.fit, v => ({ fit: v })));
   rows.push(number("field of view", "mm", 1e3, s => film(s).field_of_view_m, v => ({ film: { field_of_view_m: v } }), { empty: "all" }));
   rows.push(number("exposure", "×", 1, s => film(s).exposure, v => ({ film: { exposure: v } })));
@@ -127,7 +129,9 @@ function filmRows(state) {
     const filters = { none: { kind: "none" }, gaussian: { kind: "gaussian", sigma_px: 0.8 }, mean: { kind: "mean", radius_px: 1 }, cone: { kind: "cone", nearest: 16 } };
     rows.push(choice("noise filter", Object.keys(filters), s => e(s).sampling.filter.kind, (v, s) => ({ sampling: { ...e(s).sampling, filter: filters[v] } })));
   }
-  rows.push(text("tolerance", "rad", s => e(s).march.tolerance_rad.toExponential().replace("e+0", ""), v => ({ march: { tolerance_rad: one("tolerance", v) } })));
+  rows.push(text("tolerance", "rad",
+    s => e(s).march.tolerance_rad.toExponential().replace("e+0", ""),
+    v => ({ march: { tolerance_rad: one("tolerance", v) } })));
   return rows;
 }
 
