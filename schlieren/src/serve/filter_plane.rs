@@ -1,17 +1,19 @@
 //! Computes what the page shows of the filter: its transmission, the distribution of light on it,
 //! and the point where a pixel's light crosses it.
 
+use super::frame::{DeflectionMap, srgb_byte};
 use crate::cutoff::painted::{Painting, Stroke};
 use crate::cutoff::{Cutoff, CutoffPlane, Rgb};
 use crate::film::Framing;
 use crate::optics::{PlaneVector, SourceImage};
 use crate::render::Map;
 use crate::scene::{CutoffSpec, Scene, SceneError, TechniqueSpec};
-use rt_core::colormap::linear_to_srgb;
 use rt_core::sampler::{Sampler, Sampling};
 
 /// Pixels along each side of the shown filter plane.
 pub(super) const PIXELS: usize = 160;
+/// Deflections below this are those of rounding: no bench shows a millionth of a microradian.
+const LEAST_RAD: f64 = 1e-12;
 /// Number of points of the source's image over which the light of one pixel is distributed.
 const SOURCE_POINTS: u32 = 8;
 
@@ -30,11 +32,11 @@ pub(super) struct FilterPlane {
 
 /// Half the side of the square to show. It contains the light and the cut-off, and is rounded up to
 /// one digit so that it does not flicker. A painting keeps its size.
-pub(super) fn half_side_m(scene: &Scene, map: Option<&Map>) -> f64 {
+pub(super) fn half_side_m(scene: &Scene, traced: Option<&DeflectionMap>) -> f64 {
     let optics = scene.optics();
     let image = optics.source_image();
     let source_m = image.half_extent_m([1.0, 0.0]).max(image.half_extent_m([0.0, 1.0]));
-    let deflection_rad = map.map_or(0.0, strong_deflection_rad);
+    let deflection_rad = traced.map_or(0.0, |t| t.strong_rad);
     let light_m = source_m + optics.schlieren_focal_length_m * deflection_rad;
     let cutoff_m = match &scene.technique {
         TechniqueSpec::Schlieren { cutoff } => match cutoff {
@@ -58,24 +60,13 @@ fn rounded_up(value: f64) -> f64 {
     (value / digit).ceil() * digit
 }
 
-/// The deflection that all but few rays stay below. A shock deflects these far: with them the rest
-/// of the light would shrink to a dot.
-fn strong_deflection_rad(map: &Map) -> f64 {
-    let mut sizes: Vec<f32> = map.deflection_rad.iter().map(|d| d[0].hypot(d[1])).collect();
-    if sizes.is_empty() {
-        return 0.0;
-    }
-    let at = sizes.len() * 995 / 1000;
-    f64::from(*sizes.select_nth_unstable_by(at, f32::total_cmp).1)
-}
-
 /// The deflection up to which a legend shows colours: what the flow bends, and without a flow, what
 /// the filter plane shows.
-pub(super) fn legend_half_rad(scene: &Scene, map: &Map) -> f64 {
-    let strong_rad = strong_deflection_rad(map);
-    match strong_rad > 1e-12 {
-        true => rounded_up(1.15 * strong_rad),
-        false => half_side_m(scene, None) / scene.optics().schlieren_focal_length_m,
+pub(super) fn legend_half_rad(scene: &Scene, traced: &DeflectionMap) -> f64 {
+    if traced.strong_rad > LEAST_RAD {
+        rounded_up(1.15 * traced.strong_rad)
+    } else {
+        half_side_m(scene, None) / scene.optics().schlieren_focal_length_m
     }
 }
 
@@ -90,19 +81,22 @@ fn plane(scene: &Scene) -> Result<CutoffPlane, SceneError> {
 
 impl FilterPlane {
     /// Renders the plane. Without a map the distribution of light is unknown and left dark.
-    pub(super) fn new(scene: &Scene, map: Option<&Map>) -> Result<FilterPlane, SceneError> {
-        let half_m = half_side_m(scene, map);
+    pub(super) fn new(
+        scene: &Scene,
+        traced: Option<&DeflectionMap>,
+    ) -> Result<FilterPlane, SceneError> {
+        let half_m = half_side_m(scene, traced);
         let plane = plane(scene)?;
         let center = |i: usize| 2.0 * half_m * ((i as f64 + 0.5) / PIXELS as f64 - 0.5);
         let mut rgb = Vec::with_capacity(3 * PIXELS * PIXELS);
         for j in 0..PIXELS {
             for i in 0..PIXELS {
                 let t = plane.transmission([center(i) as f32, -center(j) as f32]);
-                rgb.extend(t.map(|v| (255.0 * linear_to_srgb(v.clamp(0.0, 1.0))).round() as u8));
+                rgb.extend(t.map(srgb_byte));
             }
         }
         let (light, outside) =
-            map.map_or((vec![0.0; PIXELS * PIXELS], 0.0), |m| histogram(scene, m, half_m));
+            traced.map_or((vec![0.0; PIXELS * PIXELS], 0.0), |t| histogram(scene, &t.map, half_m));
         Ok(FilterPlane { half_m, rgb, light, outside })
     }
 }
@@ -229,6 +223,8 @@ mod tests {
         Scene::from_toml(&format!("[flow]\nfile = \"a\"\ndensity = \"r\"\n{technique}")).unwrap()
     }
 
+    const FRAMING: Framing = Framing { width: 4, height: 4, pixel_m: 1e-3, center_m: [0.0; 2] };
+
     fn prism(deflection: PlaneVector) -> Map {
         Map {
             deflection_rad: vec![deflection; 16],
@@ -241,7 +237,8 @@ mod tests {
     #[test]
     fn light_is_where_the_deflection_brings_it() {
         let s = scene("[light]\nsource = { kind = \"point\" }");
-        let plane = FilterPlane::new(&s, Some(&prism([2e-4, -1e-4]))).unwrap();
+        let traced = DeflectionMap::new(prism([2e-4, -1e-4]), FRAMING);
+        let plane = FilterPlane::new(&s, Some(&traced)).unwrap();
         // f2 = 1.5 m: 0.3 mm to the right, 0.15 mm down.
         let brightest = (0..PIXELS * PIXELS)
             .max_by(|a, b| plane.light[*a].total_cmp(&plane.light[*b]))
@@ -280,7 +277,7 @@ mod tests {
 
     #[test]
     fn a_point_of_the_image_is_followed_back_to_where_its_light_started() {
-        let framing = Framing { width: 4, height: 4, pixel_m: 1e-3, center_m: [0.0; 2] };
+        let framing = FRAMING;
         let mut map = prism([1e-4, 0.0]);
         assert_eq!(traced(&map, &framing, 2.0, [0.5, 0.5]), Some(([1e-4, 0.0], [2e-4, 0.0])));
         // All light lands a pixel to the right of where it starts, so light in column 2 starts in

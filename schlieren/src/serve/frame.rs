@@ -82,6 +82,26 @@ pub struct FrameInfo {
 pub(super) struct DeflectionMap {
     pub(super) map: Map,
     pub(super) framing: Framing,
+    /// The deflection that all but few rays stay below. A shock deflects these far: with them the
+    /// rest of the light would shrink to a dot.
+    pub(super) strong_rad: f64,
+}
+
+impl DeflectionMap {
+    pub(super) fn new(map: Map, framing: Framing) -> DeflectionMap {
+        let mut sizes: Vec<f32> = map.deflection_rad.iter().map(|d| d[0].hypot(d[1])).collect();
+        let mut strong_rad = 0.0;
+        if !sizes.is_empty() {
+            let at = sizes.len() * 995 / 1000;
+            strong_rad = f64::from(*sizes.select_nth_unstable_by(at, f32::total_cmp).1);
+        }
+        DeflectionMap { map, framing, strong_rad }
+    }
+}
+
+/// Linear light as the page's pixels have it. The cast turns NaN into 0.
+pub(super) fn srgb_byte(v: f32) -> u8 {
+    (255.0 * linear_to_srgb(v.clamp(0.0, 1.0))).round() as u8
 }
 
 /// A frame as it is stored and sent.
@@ -110,12 +130,11 @@ impl Frame {
                 (r.framing.width, r.framing.height, r.framing.pixel_m);
             info.center_m = r.framing.center_m;
             pixels.resize(3 * r.pixels.len(), 0);
-            // The cast turns NaN into 0; the report has a warning about it.
-            let byte = |v: f32| (255.0 * linear_to_srgb(v.clamp(0.0, 1.0))).round() as u8;
+            // The report has a warning about pixels that are not numbers.
             pixels
                 .par_chunks_exact_mut(3)
                 .zip(&r.pixels)
-                .for_each(|(to, from)| to.copy_from_slice(&from.map(byte)));
+                .for_each(|(to, from)| to.copy_from_slice(&from.map(srgb_byte)));
         }
         if let Some(f) = filter {
             (info.filter_half_m, info.filter_pixels, info.light_outside) =

@@ -1,10 +1,10 @@
 //! What the colours of a schlieren image mean: the colour of each deflection.
 
+use super::frame::srgb_byte;
 use crate::path::{Exit, Start};
 use crate::render::{RenderError, technique};
 use crate::scene::{Scene, TechniqueSpec};
 use crate::technique::Photon;
-use rt_core::colormap::linear_to_srgb;
 use rt_core::sampler::{Sampler, Sampling};
 
 /// Colours along each side of the legend.
@@ -54,9 +54,7 @@ impl Legend {
                     (0..3).for_each(|c| sum[c] += f64::from(energy[c]));
                 }
                 let bright = sum.map(|e| (scene.exposure() * e / f64::from(points)) as f32);
-                rgb.extend(
-                    bright.map(|v| (255.0 * linear_to_srgb(v.clamp(0.0, 1.0))).round() as u8),
-                );
+                rgb.extend(bright.map(srgb_byte));
             }
         }
         Ok(Some(Legend { half_rad, rgb }))

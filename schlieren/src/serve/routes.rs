@@ -6,7 +6,7 @@
 //! | `GET /` and `GET /NAME` | the page and its files |
 //! | `GET /state` | scene, arrays, limits (JSON) |
 //! | `GET /frame?after=N` | the newest frame when its number is not N; waits, 204 on timeout |
-//! | `POST /scene` | a change as JSON merge patch; beside the scene's sections, `step` selects the time of a series, `overlay` what is drawn on the image, and `fit` a frame of the flow's shape |
+//! | `POST /scene` | a change, as [`Session::edit`] takes it |
 //! | `POST /back` | returns to the last scene that was shown |
 //! | `POST /paint` | [`Paint`] |
 //! | `POST /trace` | where the light of a point of the image crosses the filter |

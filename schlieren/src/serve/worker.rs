@@ -377,7 +377,7 @@ impl Worker {
                 &AtomicBool::new(false),
             )
             .ok_or(RenderError::Cancelled)?;
-            Ok::<_, RenderError>(Arc::new(DeflectionMap { map, framing }))
+            Ok::<_, RenderError>(Arc::new(DeflectionMap::new(map, framing)))
         })??;
         if !level.draft {
             self.traced = Some((geometry.clone(), traced.clone()));
@@ -409,10 +409,12 @@ impl Worker {
         rendered: &RenderOutput,
         traced: &Arc<DeflectionMap>,
     ) -> Result<(), RenderError> {
-        let filter = FilterPlane::new(scene, Some(&traced.map))?;
-        let half_rad = legend_half_rad(scene, &traced.map);
+        let filter = FilterPlane::new(scene, Some(traced))?;
         // Drafts keep the legend that is shown.
-        let legend = if info.draft { None } else { Legend::new(scene, half_rad)? };
+        let legend = match info.draft {
+            true => None,
+            false => Legend::new(scene, legend_half_rad(scene, traced))?,
+        };
         let (mut axes, mut flow_center_m, mut whole_width_m) = ([[0.0; 3]; 3], [0.0; 3], 0.0);
         if let Some(Section { full, .. }) = &self.section {
             let view = &full.view;

@@ -92,7 +92,7 @@ impl Session {
         };
 
         // Adds the strokes to a painting.
-        let half_m = half_side_m(&shared.scene, traced_view.as_ref().map(|t| &t.map));
+        let half_m = half_side_m(&shared.scene, traced_view.as_deref());
         let (mut painting, same) = as_painting(&shared.scene, &cutoff, half_m, [0.0; 3])
             .map_err(|e| refused(chain(&e)))?;
         let strokes = strokes(&points_m, paint);
