@@ -234,7 +234,8 @@ impl CellData<'_> {
         let corners = self.mesh.corners(self.cell);
         scratch.points.clear();
         scratch.points.extend(corners.ids.iter().map(|&i| self.mesh.point(i as usize)));
-        let shape = Cell::new(&scratch.points, &corners.shape);
+        let shape =
+            Cell::new(&scratch.points, &corners.shape).with_shares(self.field.shares(&corners.ids));
         let own_mark = if self.mesh.is_hidden(self.cell) {
             Mark::Hidden
         } else if self.of_cells.is_some_and(|v| !v[self.cell].is_finite()) {

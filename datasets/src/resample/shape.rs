@@ -5,14 +5,48 @@
 //! Newton's method inverts their maps. If the map folds (corners with Jacobians of both signs,
 //! collapsed edges) or Newton fails, the cell becomes a fan of tetrahedra around its centre and the
 //! centres of its faces, which joins its neighbours at their corners and edges.
+//!
+//! Polynomials of corners that disagree, as at shocks, would be joined with a kink at each face: the
+//! shares of elements have slopes there. Those of hexahedra can be taken at smoothstep parameters
+//! instead ([`Shares::Smooth`]), which have none.
 
 use super::mesh::Shape;
 use glam::{DMat3, DVec3};
+
+/// The functions by which the corners of a cell share in a value.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) enum Shares {
+    /// The shape functions of the element.
+    #[default]
+    OfElement,
+    /// Those of a hexahedron at smoothstep parameters: without slope across its faces. Then the
+    /// gradient of a mean of polynomials is continuous where lines of the grid go straight through
+    /// a face. The error in smooth fields is larger, by up to half.
+    Smooth,
+}
+
+impl Shares {
+    /// The shares at the parameters `q`, and their derivatives.
+    pub(super) fn at(self, shape: &Shape, q: DVec3) -> Basis {
+        if self == Shares::OfElement {
+            return basis(shape, q);
+        }
+        // Beyond a bent face the smoothstep goes on, but not far.
+        let q = q.clamp(DVec3::splat(-BEYOND), DVec3::splat(1.0 + BEYOND));
+        let (mut n, mut d) = basis(shape, q * q * (3.0 - 2.0 * q));
+        let slope = 6.0 * q * (1.0 - q);
+        d.iter_mut().for_each(|d| *d *= slope);
+        // The sum is 1 but for rounding, which the large values of a field would show.
+        n[0] = 1.0 - n[1..].iter().sum::<f64>();
+        (n, d)
+    }
+}
 
 /// A cell with its corners, prepared for queries at many points.
 pub(super) struct Cell<'a> {
     corners: &'a [DVec3],
     shape: &'a Shape,
+    shares: Shares,
     /// Whether to use the tetrahedra for all points.
     folded: bool,
     /// Length of the diagonal of the cell's box.
@@ -28,6 +62,8 @@ const MAX_STEPS: usize = 25;
 /// Ratio of the smallest to the largest Jacobian among corners below which a cell counts as folded
 /// or collapsed.
 const MIN_JACOBIAN_RATIO: f64 = 1e-6;
+/// Parameters this far beyond a face have smooth shares of their own.
+const BEYOND: f64 = 0.25;
 
 /// Shape functions and their derivatives along the three parameters.
 pub(super) type Basis = ([f64; 8], [DVec3; 8]);
@@ -124,7 +160,8 @@ impl<'a> Cell<'a> {
         let (low, high) = corners
             .iter()
             .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| (l.min(*p), h.max(*p)));
-        let mut cell = Cell { corners, shape, folded: false, size: (high - low).length() };
+        let size = (high - low).length();
+        let mut cell = Cell { corners, shape, shares: Shares::OfElement, folded: false, size };
         let parameters = corner_parameters(shape);
         if !parameters.is_empty() {
             let jacobians = parameters.iter().map(|q| cell.map(*q).1.determinant());
@@ -134,6 +171,11 @@ impl<'a> Cell<'a> {
             cell.folded = small.is_nan() || small <= MIN_JACOBIAN_RATIO * large;
         }
         cell
+    }
+
+    /// The cell with other shares.
+    pub(super) fn with_shares(self, shares: Shares) -> Self {
+        Cell { shares, ..self }
     }
 
     /// True when the cell's own map cannot be used.
@@ -156,7 +198,7 @@ impl<'a> Cell<'a> {
     }
 
     /// Locates `p` in the cell: the distance outside, in units of the cell (0 inside), and in
-    /// `weights` the share of each corner in the element's value there.
+    /// `weights` the share of each corner in the value there.
     pub(super) fn locate(&self, p: DVec3, weights: &mut Vec<f64>) -> Option<f64> {
         weights.clear();
         match self.shape {
@@ -197,7 +239,7 @@ impl<'a> Cell<'a> {
                     q - DVec3::ONE
                 };
                 let outside = below.max(above).max_element().max(0.0);
-                weights.extend(&basis(self.shape, q).0[..self.corners.len()]);
+                weights.extend(&self.shares.at(self.shape, q).0[..self.corners.len()]);
                 return Some(outside);
             }
         }

@@ -70,6 +70,9 @@ struct Group {
     terms: [Lane; TERMS],
     low: Lane,
     high: Lane,
+    /// Twice the slack, and a quarter of its inverse.
+    reach: Lane,
+    fall: Lane,
 }
 
 const EMPTY: Group = Group {
@@ -80,6 +83,8 @@ const EMPTY: Group = Group {
     terms: [ZERO; TERMS],
     low: ZERO,
     high: ZERO,
+    reach: ZERO,
+    fall: ZERO,
 };
 
 impl Polynomials {
@@ -113,7 +118,10 @@ impl Polynomials {
                 lane[l] = c;
             }
             group.constant[l] = parts.constant;
-            [group.low[l], group.high[l]] = parts.bounds;
+            let bounds = parts.bounds;
+            (group.low[l], group.high[l]) = (bounds.low, bounds.high);
+            group.reach[l] = 2.0 * bounds.slack;
+            group.fall[l] = if bounds.slack > 0.0 { 0.25 / bounds.slack } else { 0.0 };
         }
     }
 
@@ -177,9 +185,11 @@ impl Group {
             let second = 0.5 * (x * hx + y * hy + z * hz);
             let third = (1.0 / 3.0) * (x * kx + y * ky + z * kz);
             let change = self.constant[l] + ((third + second) + first);
-            // Beyond its bounds a polynomial is constant.
-            let free = if change > self.low[l] && change < self.high[l] { share.n[l] } else { 0.0 };
-            let change = change.max(self.low[l]).min(self.high[l]);
+            let within = change.max(self.low[l]).min(self.high[l]);
+            let beyond = (change - within).max(-self.reach[l]).min(self.reach[l]);
+            let less = self.fall[l] * beyond.abs();
+            let change = within + (beyond - less * beyond);
+            let free = share.n[l] * (1.0 - 2.0 * less);
             let (gx, gy, gz) = (c[0][l] + hx + kx, c[1][l] + hy + ky, c[2][l] + hz + kz);
             let value = self.value[l] + change;
             out[0][l] = share.n[l] * value;

@@ -5,6 +5,7 @@ use super::border::{each_triangle, line_through, normal_and_middle};
 use super::shares::Map;
 use super::{CellField, Kind};
 use crate::resample::mesh::NO_FACE;
+use crate::resample::shape::Shares;
 use glam::DVec3;
 
 /// Corners this far off the plane of a face, as a part of the cell's size, leave it plane, and
@@ -98,7 +99,11 @@ impl PreparedCell {
             number += 1;
         });
         self.has_values = field.kinds[cell] == Kind::Gas;
-        self.map.prepare(&self.corners, &corners.shape, self.size);
+        let is_limited =
+            |&id: &u32| field.expansions.get(id as usize).is_some_and(|e| e.is_limited());
+        let shares =
+            if corners.ids.iter().any(is_limited) { field.shares } else { Shares::OfElement };
+        self.map.prepare(&self.corners, &corners.shape, self.size, shares);
         let corner = |(&id, &place): (&u32, &DVec3)| Corner {
             place,
             value: field.values[id as usize],

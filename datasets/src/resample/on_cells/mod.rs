@@ -32,7 +32,7 @@ pub use walker::{Beyond, CellWalker, Entry};
 
 use super::mesh::{Corners, Mesh, Neighbours, Topology};
 use super::reconstruct::{Expansion, FitQuality, PointField, Reconstruction};
-use super::shape;
+use super::shape::{self, Shares};
 use super::walls::Walls;
 use super::{ResampleError, Samples};
 use blend::Degree;
@@ -89,6 +89,8 @@ pub struct CellField {
     values: Vec<f64>,
     /// One for each point; none for [`Reconstruction::Linear`].
     expansions: Vec<Expansion>,
+    /// Those of cells with limited points.
+    shares: Shares,
     kinds: Vec<Kind>,
     neighbours: Neighbours,
     border: Border,
@@ -183,7 +185,8 @@ impl CellField {
             (Reconstruction::Cubic, None) => PointField::of_points(&mesh, values),
             (Reconstruction::Cubic, Some(cells)) => PointField::of_cells(&mesh, cells, values),
         };
-        let (fit, expansions) = (field.quality(&mesh), field.into_expansions());
+        let fit = field.quality(&mesh);
+        let (expansions, shares) = field.into_parts();
         let has_value = |cell: usize, ids: &[u32]| {
             of_cells.is_none_or(|v| v[cell].is_finite())
                 && ids.iter().all(|&id| values[id as usize].is_finite())
@@ -234,6 +237,7 @@ impl CellField {
             mesh,
             values,
             expansions,
+            shares,
             kinds,
             neighbours,
             border,

@@ -7,7 +7,7 @@
 
 use super::blend::{LANES, Share, set};
 use crate::resample::mesh::Shape;
-use crate::resample::shape::{Cell, basis};
+use crate::resample::shape::{Cell, Shares, basis};
 use glam::{DMat3, DVec3};
 
 /// Newton has converged when the step, in units of the cell, is this small: the next one would be
@@ -24,6 +24,7 @@ const AFFINE: f64 = 1e-12;
 pub(super) struct Map {
     kind: MapKind,
     shape: Option<Shape>,
+    shares: Shares,
     /// Place and inverse Jacobian at the parameters `middle`.
     middle: DVec3,
     at_middle: DVec3,
@@ -40,8 +41,9 @@ enum MapKind {
 }
 
 impl Map {
-    pub(super) fn prepare(&mut self, corners: &[DVec3], shape: &Shape, size: f64) {
+    pub(super) fn prepare(&mut self, corners: &[DVec3], shape: &Shape, size: f64, shares: Shares) {
         self.kind = MapKind::Newton;
+        self.shares = shares;
         self.middle = match shape {
             Shape::Tetra => DVec3::splat(0.25),
             Shape::Wedge => DVec3::new(1.0 / 3.0, 1.0 / 3.0, 0.5),
@@ -141,7 +143,7 @@ pub(super) fn shares(corners: &[DVec3], map: &Map, at: DVec3, out: &mut Vec<Shar
         }
         return true;
     }
-    let (n, d) = basis(shape, q);
+    let (n, d) = map.shares.at(shape, q);
     for i in 0..corners.len() {
         set(out, i, n[i], to_space * d[i]);
     }

@@ -30,19 +30,24 @@ const RESIDUAL: [f64; 2] = [0.1, 0.25];
 /// the same values counts too, times this.
 const QUADRATIC_SHARE: f64 = 0.7;
 
-/// Where a polynomial gives way, the error is larger than what is left of it adds: a step between
-/// two points may be anywhere between them. Of a shock that is half as thick as a tetrahedron is
-/// wide, deflections are 7 times the difference that this makes once. What is left is counted with
-/// the whole gradient: at a sharp step the limited one is zero, as if nothing were in doubt. With 3
-/// times, that shock's error was 1.05 times what the mesh and the lattice told.
-const UNRESOLVED: f64 = 4.0;
+/// Where a polynomial gives way, the error is larger than what the spline adds: a step between two
+/// points may be anywhere between them. Of a shock that is half as thick as a tetrahedron is wide,
+/// deflections are 3.5 times the difference that this makes once.
+const UNRESOLVED: f64 = 2.0;
 
-/// Number of samples that limit a gradient: on a cubic grid, those that share a cell.
+/// Number of samples of a spline: on a cubic grid, those that share a cell.
 const ADJACENT: usize = 26;
+/// The nearest of them, as on a cubic grid. The spline gives each a quarter of the point's own
+/// weight.
+const NEXT: usize = 6;
+/// Number of coefficients of a polynomial of second degree.
+const SPLINE: usize = 1 + TERMS_TO_DEGREE[2];
 
-/// How far a polynomial may go beyond the values around the point, as a part of their range. A
-/// maximum between points is higher than they are.
+/// How far a polynomial may go beyond the values around the point, as a part of their range: a
+/// maximum between points is higher than they are. Beyond, it bends over within as much again.
 const BEYOND: f64 = 0.25;
+/// As much for a spline in its place: of a maximum at a shock, nothing is known.
+const SPLINE_BEYOND: f64 = 0.02;
 
 /// How well a polynomial fits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,11 +67,7 @@ pub(in crate::resample) struct Expansion {
     /// What is added to the point's value, and the coefficients of the monomials.
     constant: f32,
     terms: [f32; TERMS],
-    /// What limits took from the terms of first degree.
-    taken: [f32; 3],
-    /// Bounds of what is added to the point's value.
-    low: f32,
-    high: f32,
+    bounds: Bounds,
     state: State,
 }
 
@@ -75,7 +76,33 @@ pub(in crate::resample) struct Parts {
     pub(in crate::resample) frame: [f32; 6],
     pub(in crate::resample) constant: f32,
     pub(in crate::resample) terms: [f32; TERMS],
-    pub(in crate::resample) bounds: [f32; 2],
+    pub(in crate::resample) bounds: Bounds,
+}
+
+/// Bounds of what is added to a point's value. From there on it grows ever slower, without a kink,
+/// and by the slack at most.
+#[derive(Debug, Clone, Copy, Default)]
+pub(in crate::resample) struct Bounds {
+    pub(in crate::resample) low: f32,
+    pub(in crate::resample) high: f32,
+    pub(in crate::resample) slack: f32,
+}
+
+impl Bounds {
+    fn times(self, factor: f32) -> Bounds {
+        let ends = [self.low * factor, self.high * factor];
+        let slack = self.slack * factor.abs();
+        Bounds { low: ends[0].min(ends[1]), high: ends[0].max(ends[1]), slack }
+    }
+
+    fn bounded(&self, x: f64) -> f64 {
+        let within = x.clamp(f64::from(self.low), f64::from(self.high));
+        let slack = f64::from(self.slack);
+        let beyond = (x - within).clamp(-2.0 * slack, 2.0 * slack);
+        // A parabola that ends without slope at twice the slack.
+        let less = if slack > 0.0 { beyond * beyond.abs() / (4.0 * slack) } else { 0.0 };
+        within + (beyond - less)
+    }
 }
 
 impl Expansion {
@@ -85,21 +112,14 @@ impl Expansion {
             frame: [0.0; 6],
             constant: 0.0,
             terms: [0.0; TERMS],
-            taken: [0.0; 3],
-            low: 0.0,
-            high: 0.0,
+            bounds: Bounds { low: 0.0, high: 0.0, slack: 0.0 },
             state,
         }
     }
 
     /// The numbers of the polynomial.
     pub(in crate::resample) fn parts(&self) -> Parts {
-        Parts {
-            frame: self.frame,
-            constant: self.constant,
-            terms: self.terms,
-            bounds: [self.low, self.high],
-        }
+        Parts { frame: self.frame, constant: self.constant, terms: self.terms, bounds: self.bounds }
     }
 
     /// The numbers of a polynomial whose difference from this one is the second of
@@ -112,17 +132,18 @@ impl Expansion {
         }
         let factor = (1.0 - UNRESOLVED) as f32;
         parts.terms.iter_mut().for_each(|c| *c *= factor);
-        for (term, taken) in parts.terms.iter_mut().zip(self.taken) {
-            *term -= UNRESOLVED as f32 * taken;
-        }
         parts.constant *= factor;
-        let [low, high] = parts.bounds;
-        parts.bounds = [factor * high, factor * low];
+        parts.bounds = parts.bounds.times(factor);
         parts
     }
 
     pub(super) fn state(&self) -> State {
         self.state
+    }
+
+    /// Whether a spline takes the polynomial's place, wholly or in part.
+    pub(in crate::resample) fn is_limited(&self) -> bool {
+        self.state == State::Limited
     }
 
     /// Whether the polynomial is used as it is.
@@ -137,8 +158,8 @@ impl Expansion {
     }
 
     /// What is added to the point's value at distance `d`, and the part of it that a less accurate
-    /// polynomial would leave out: the third powers, or [`UNRESOLVED`] times all, before limits,
-    /// where the polynomial is not whole.
+    /// polynomial would leave out: the third powers, or [`UNRESOLVED`] times all where the
+    /// polynomial is not whole.
     #[inline]
     pub(super) fn parts_at(&self, d: DVec3) -> [f64; 2] {
         let terms = monomials(in_frame(&self.frame, d));
@@ -148,12 +169,8 @@ impl Expansion {
         };
         let third = of(TERMS_TO_DEGREE[2]..TERMS);
         let change = f64::from(self.constant) + (of(0..TERMS_TO_DEGREE[2]) + third);
-        let bounded = |x: f64| x.clamp(f64::from(self.low), f64::from(self.high));
-        if self.is_whole() {
-            return [bounded(change), third];
-        }
-        let taken: f64 = self.taken.iter().zip(&terms).map(|(c, m)| f64::from(*c) * m).sum();
-        [bounded(change), UNRESOLVED * bounded(change + taken)]
+        let bounded = self.bounds.bounded(change);
+        [bounded, if self.is_whole() { third } else { UNRESOLVED * bounded }]
     }
 }
 
@@ -303,23 +320,21 @@ impl Fit {
         let Some(solution) = best else { return Expansion::nothing(State::FewNeighbours) };
         let share = share_of(solution.residual);
         let mut coefficients = solution.coefficients.map(|c| share * c);
-        let mut taken = DVec3::ZERO;
         if share < 1.0 {
-            let gradient = limited(solution.gradient, within(&self.samples, ADJACENT));
-            for (sum, g) in coefficients[1..].iter_mut().zip(gradient.to_array()) {
-                *sum += (1.0 - share) * 0.5 * g;
+            let spline = spline_at(within(&self.samples, ADJACENT), free);
+            for (sum, c) in coefficients.iter_mut().zip(spline) {
+                *sum += (1.0 - share) * c;
             }
-            taken = (1.0 - share) * 0.5 * (solution.gradient - gradient);
         }
-        let slack = BEYOND * (high - low);
+        let (range, beyond) = (high - low, share * BEYOND);
+        let slack = range * (beyond + (1.0 - share) * SPLINE_BEYOND);
+        let (low, high) = (low - beyond * range, high + beyond * range);
         let [constant, terms @ ..] = coefficients.map(|c| c as f32);
         Expansion {
             frame,
             constant,
             terms,
-            taken: taken.as_vec3().to_array(),
-            low: (low - slack) as f32,
-            high: (high + slack) as f32,
+            bounds: Bounds { low: low as f32, high: high as f32, slack: slack as f32 },
             state: match (share, solution.degree) {
                 (_, 0 | 1) => State::FewNeighbours,
                 (1.0, _) => State::Fitted,
@@ -329,19 +344,27 @@ impl Fit {
     }
 }
 
-/// The gradient, shortened until it leads to no value beyond those of the samples (Barth and
-/// Jespersen, "The design and application of upwind schemes on unstructured meshes", 1989): no
-/// values below those on both sides of a shock.
-fn limited(gradient: DVec3, samples: &[Sample]) -> DVec3 {
-    let range = |(low, high): (f64, f64), s: &Sample| (low.min(s.value), high.max(s.value));
-    let (low, high) = samples.iter().fold((0.0, 0.0), range);
-    let share = samples.iter().fold(1.0f64, |share, s| {
-        let change = gradient.dot(s.place);
-        let most = if change > 0.0 { high } else { low };
-        // No change is in any range.
-        if change == 0.0 { share } else { share.min(most / change) }
-    });
-    gradient * share
+/// Value, gradient and second derivatives at a point of a cubic B-spline whose coefficients are the
+/// values (de Boor, "A Practical Guide to Splines", 2001). It makes no new extrema, and has no
+/// kinks. On a grid they are those of polynomials of first and second degree that are fitted with
+/// the spline's weights: 4 : 1 along an axis, and products of these across. A point that is not
+/// `free` has a value too, zero.
+fn spline_at(samples: &[Sample], free: bool) -> [f64; SPLINE] {
+    let next = within(samples, NEXT);
+    let square = next.iter().map(|s| s.square).sum::<f64>() / next.len() as f64;
+    let mut equations = NormalEquations::<SPLINE>::EMPTY;
+    let mut row = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+    if !free {
+        equations.add(&row, 0.0, 1.0, SPLINE);
+    }
+    for s in samples {
+        row[1..].copy_from_slice(&means(s.place, s.second)[..SPLINE - 1]);
+        equations.add(&row, s.value, (-2.0 * s.square / square).exp2(), SPLINE);
+    }
+    let line = 1 + TERMS_TO_DEGREE[1];
+    let mut spline = equations.solve(SPLINE);
+    spline[..line].copy_from_slice(&equations.solve(line)[..line]);
+    spline
 }
 
 /// Most files have values in f32. Where these differ by rounding only, there is nothing to limit.
@@ -365,16 +388,10 @@ fn share_of(residual: f64) -> f64 {
 }
 
 /// A polynomial and how well it fits.
-///
-/// Where it does not, half of the linear fit's gradient takes its place: the elements' mean of such
-/// lines has the mean slope at each point from both sides, so that a captured shock has no steps at
-/// the faces of its cells.
 struct Solution {
     /// The constant, and the coefficients of the monomials.
     coefficients: [f64; TERMS + 1],
     degree: usize,
-    /// The gradient of the linear fit, in the frame.
-    gradient: DVec3,
     /// Root mean square of the residuals by that of the values, for as many equations as there are
     /// more than unknowns.
     residual: f64,
@@ -432,9 +449,7 @@ impl Solution {
             let quadratic = equations.solve(1 + TERMS_TO_DEGREE[2]);
             residual = residual.max(QUADRATIC_SHARE * residual_of(&quadratic));
         }
-        let linear = equations.solve(1 + TERMS_TO_DEGREE[1]);
-        let gradient = DVec3::new(linear[1], linear[2], linear[3]);
-        Some(Solution { coefficients, degree, gradient, residual, complete: known == TERMS })
+        Some(Solution { coefficients, degree, residual, complete: known == TERMS })
     }
 }
 

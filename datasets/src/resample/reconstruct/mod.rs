@@ -4,13 +4,15 @@
 //! cell. Light is bent by gradients: a lattice finer than the mesh would show the cells. Here, each
 //! point gets a polynomial of up to third degree, fitted by weighted least squares to the values
 //! around it ([`expansion`]), and the value at a place in a cell is the mean of the polynomials of
-//! the cell's corners, weighted by the shape functions of the element. This is a partition of unity
+//! the cell's corners, weighted by their shares ([`super::shape`]). This is a partition of unity
 //! (Melenk and Babuška, "The partition of unity finite element method", 1996): continuous, exact
 //! for cubic fields, and with an error of fourth order in the size of the cells (third order for
 //! gradients) where the field is smooth.
 //!
-//! Where no polynomial fits, as at shocks, it gives way to a line with half of a limited gradient,
-//! which makes no new extrema.
+//! Where no polynomial fits, as at shocks, the mesh does not tell where in a cell the field changes.
+//! A cubic B-spline with the values as its coefficients takes the polynomial's place. It does not
+//! go through the values, but makes no new extrema, and shows no cells: a shock that crosses the
+//! lines of a grid obliquely has no stairs.
 //!
 //! Values of cells are taken as what solvers of finite volumes mean by them, averages over the
 //! cells: the averages of the polynomials are fitted to them ([`cell_moments`]).
@@ -24,7 +26,8 @@ mod polynomial;
 pub(super) use expansion::Expansion;
 pub(super) use polynomial::TERMS;
 
-use super::mesh::Mesh;
+use super::mesh::{Mesh, Shape};
+use super::shape::Shares;
 use cell_moments::CellMoments;
 use expansion::Fit;
 use glam::DVec3;
@@ -61,6 +64,8 @@ pub(super) struct PointField<'a> {
     values: &'a [f64],
     /// One for each point; none for [`Reconstruction::Linear`].
     expansions: Vec<Expansion>,
+    /// Whether all cells are hexahedra.
+    hexahedra: bool,
 }
 
 /// How well the polynomials fit.
@@ -83,7 +88,7 @@ pub struct FitQuality {
 impl<'a> PointField<'a> {
     /// The elements' own interpolation of values at points.
     pub(super) fn linear(values: &'a [f64]) -> PointField<'a> {
-        PointField { values, expansions: vec![] }
+        PointField { values, expansions: vec![], hexahedra: false }
     }
 
     /// Fits polynomials to values at points.
@@ -93,7 +98,7 @@ impl<'a> PointField<'a> {
             around.points(mesh, &incidence, point);
             fit.over_points(mesh, values, point, around)
         };
-        PointField { values, expansions: fitted(mesh, fit) }
+        PointField { values, expansions: fitted(mesh, fit), hexahedra: only_hexahedra(mesh) }
     }
 
     /// Fits polynomials to averages over cells. `values` are the means at the points, which remain
@@ -105,7 +110,7 @@ impl<'a> PointField<'a> {
             around.cells(mesh, &incidence, &moments, point);
             fit.over_cells(mesh, cells, &moments, values[point], point, around)
         };
-        PointField { values, expansions: fitted(mesh, fit) }
+        PointField { values, expansions: fitted(mesh, fit), hexahedra: only_hexahedra(mesh) }
     }
 
     /// Whether there are no polynomials.
@@ -113,13 +118,23 @@ impl<'a> PointField<'a> {
         self.expansions.is_empty()
     }
 
-    /// The polynomials alone.
-    pub(super) fn into_expansions(self) -> Vec<Expansion> {
-        self.expansions
+    /// The polynomials alone, and the shares that join those of limited points.
+    pub(super) fn into_parts(self) -> (Vec<Expansion>, Shares) {
+        let shares = if self.hexahedra { Shares::Smooth } else { Shares::OfElement };
+        (self.expansions, shares)
     }
 
-    /// The value at `p` in the cell with these corners, from the weights of its element, and the
-    /// part of it that less accurate polynomials would leave out ([`Expansion::parts_at`]).
+    /// The shares of a cell's corners: without slope across its faces where polynomials disagree.
+    pub(super) fn shares(&self, corners: &[u32]) -> Shares {
+        match self.hexahedra && corners.iter().any(|&id| self.expansions[id as usize].is_limited())
+        {
+            true => Shares::Smooth,
+            false => Shares::OfElement,
+        }
+    }
+
+    /// The value at `p` in the cell with these corners, from their shares there, and the part of it
+    /// that less accurate polynomials would leave out ([`Expansion::parts_at`]).
     pub(super) fn at(&self, mesh: &Mesh, corners: &[u32], weights: &[f64], p: DVec3) -> [f64; 2] {
         let mut sum = [0.0; 2];
         for (&id, &weight) in corners.iter().zip(weights) {
@@ -185,6 +200,10 @@ impl<'a> PointField<'a> {
         quality.max_difference = pieces.iter().map(|p| p.1).fold(0.0, f64::max);
         quality
     }
+}
+
+fn only_hexahedra(mesh: &Mesh) -> bool {
+    (0..mesh.num_cells()).into_par_iter().all(|cell| mesh.corners(cell).shape == Shape::Hexa)
 }
 
 /// One expansion for each point, with scratch memory for each thread.
