@@ -78,11 +78,7 @@ impl CellsOfPoints {
 
 /// Finds the gaps among the cells of a Delaunay triangulation: triangles (`N` = 3) or tetrahedra.
 /// `spacings`: how many times as wide as the cells around it a gap is.
-pub(crate) fn find<const N: usize>(
-    points: &[DVec3],
-    corners: &[[u32; N]],
-    spacings: f64,
-) -> Gaps {
+pub(crate) fn find<const N: usize>(points: &[DVec3], corners: &[[u32; N]], spacings: f64) -> Gaps {
     let sizes: Vec<f64> = corners.par_iter().map(|c| size(points, c)).collect();
     let around = CellsOfPoints::new(corners, points.len());
     let own: Vec<f64> = (0..points.len())
@@ -105,7 +101,9 @@ pub(crate) fn find<const N: usize>(
     let stretch: Vec<f64> = corners
         .par_iter()
         .zip(&sizes)
-        .map(|(corners, size)| size / corners.map(|p| spacing[p as usize]).into_iter().fold(0.0, f64::max))
+        .map(|(corners, size)| {
+            size / corners.map(|p| spacing[p as usize]).into_iter().fold(0.0, f64::max)
+        })
         .collect();
     let usual = quantile(&mut stretch.clone(), USUAL).max(1.0);
     let mut is_gap: Vec<bool> = stretch.iter().map(|s| *s > spacings * usual).collect();

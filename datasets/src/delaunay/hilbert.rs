@@ -36,9 +36,9 @@ pub(super) fn index(mut x: [u32; 3]) -> u64 {
     }
     let x = x.map(|v| v ^ t);
     // The bits of the three, interleaved.
-    (0..BITS).rev().fold(0, |key, bit| {
-        x.iter().fold(key, |key, v| (key << 1) | u64::from((v >> bit) & 1))
-    })
+    (0..BITS)
+        .rev()
+        .fold(0, |key, bit| x.iter().fold(key, |key, v| (key << 1) | u64::from((v >> bit) & 1)))
 }
 
 #[cfg(test)]
@@ -48,7 +48,8 @@ mod tests {
     #[test]
     fn the_curve_visits_every_cell_and_steps_to_a_neighbour() {
         let n = 8u32;
-        let mut cells: Vec<[u32; 3]> = (0..n * n * n).map(|i| [i % n, i / n % n, i / n / n]).collect();
+        let mut cells: Vec<[u32; 3]> =
+            (0..n * n * n).map(|i| [i % n, i / n % n, i / n / n]).collect();
         cells.sort_by_key(|c| index(*c));
         for pair in cells.windows(2) {
             let step: u32 = (0..3).map(|a| pair[0][a].abs_diff(pair[1][a])).sum();

@@ -17,9 +17,9 @@ mod plane;
 mod predicates;
 pub(crate) mod snap;
 mod space;
-mod tetrahedra;
 #[cfg(test)]
 mod tests;
+mod tetrahedra;
 
 pub(crate) use plane::triangles;
 pub(crate) use space::tetrahedra;

@@ -46,7 +46,11 @@ impl Snapped {
             .enumerate()
             .map(|(i, p)| {
                 let place = round(p);
-                (hilbert::index(place.map(|x| (x >> (BITS + 1 - hilbert::BITS)) as u32)), place, i as u32)
+                (
+                    hilbert::index(place.map(|x| (x >> (BITS + 1 - hilbert::BITS)) as u32)),
+                    place,
+                    i as u32,
+                )
             })
             .collect();
         keyed.par_sort_unstable();
