@@ -17,7 +17,8 @@
 //! 3. The *stretch* of a cell is its size by the largest spacing at its corners. It is 1 in a lattice,
 //!    and up to 4 among points by chance.
 //! 4. So a cell is a gap where its stretch is more than [`Gaps::spacings`] times the *usual* stretch,
-//!    which four in five of all cells do not exceed.
+//!    which four in five of all cells do not exceed. This is repeated, without the cells that were
+//!    found, until no more are: cospherical points of a body may have many cells in it.
 //! 5. From gaps, the place without points goes on into cells next to them with two thirds of that
 //!    (hysteresis, Canny 1986): up to where a body becomes as thin as its points are apart.
 //!
@@ -79,55 +80,125 @@ impl CellsOfPoints {
 /// Finds the gaps among the cells of a Delaunay triangulation: triangles (`N` = 3) or tetrahedra.
 /// `spacings`: how many times as wide as the cells around it a gap is.
 pub(crate) fn find<const N: usize>(points: &[DVec3], corners: &[[u32; N]], spacings: f64) -> Gaps {
-    let sizes: Vec<f64> = corners.par_iter().map(|c| size(points, c)).collect();
-    let around = CellsOfPoints::new(corners, points.len());
-    let own: Vec<f64> = (0..points.len())
-        .into_par_iter()
-        .map_init(Vec::new, |sorted, p| {
-            sorted.clear();
-            sorted.extend(around.of(p).iter().map(|c| sizes[*c as usize]));
-            quantile(sorted, LOWER)
-        })
-        .collect();
-    let spacing: Vec<f64> = (0..points.len())
-        .into_par_iter()
-        .map_init(Vec::new, |sorted, p| {
-            sorted.clear();
-            let corners = around.of(p).iter().flat_map(|c| corners[*c as usize]);
-            sorted.extend(corners.map(|q| own[q as usize]));
-            quantile(sorted, 0.5)
-        })
-        .collect();
-    let stretch: Vec<f64> = corners
-        .par_iter()
-        .zip(&sizes)
-        .map(|(corners, size)| {
-            size / corners.map(|p| spacing[p as usize]).into_iter().fold(0.0, f64::max)
-        })
-        .collect();
-    let usual = quantile(&mut stretch.clone(), USUAL).max(1.0);
-    let mut is_gap: Vec<bool> = stretch.iter().map(|s| *s > spacings * usual).collect();
+    let mut cloud = Cloud {
+        corners,
+        around: CellsOfPoints::new(corners, points.len()),
+        sizes: corners.par_iter().map(|c| size(points, c)).collect(),
+        is_gap: vec![false; corners.len()],
+        own: vec![0.0; points.len()],
+        spacing: vec![0.0; points.len()],
+    };
+    let all: Vec<u32> = (0..points.len() as u32).collect();
+    cloud.measure(&all);
+    let mut stretch: Vec<f64> =
+        (0..corners.len()).into_par_iter().map(|c| cloud.stretch(c)).collect();
+    let threshold = spacings * quantile(&mut stretch, USUAL).max(1.0);
 
-    // Neighbours of gaps that are wide, too.
-    let is_wide = |c: u32| stretch[c as usize] > GROWTH * spacings * usual;
-    let mut front: Vec<u32> = (0..corners.len() as u32).filter(|c| is_gap[*c as usize]).collect();
-    while let Some(cell) = front.pop() {
-        let face = corners[cell as usize];
-        for skipped in 0..N {
-            for &other in around.of(face[(skipped + 1) % N] as usize) {
-                let shares = |p: &u32| corners[other as usize].contains(p);
-                if !is_gap[other as usize]
-                    && is_wide(other)
-                    && face.iter().enumerate().all(|(i, p)| i == skipped || shares(p))
-                {
-                    is_gap[other as usize] = true;
-                    front.push(other);
+    // Gaps hide how dense the points beside them are: each round sees more of that.
+    let mut candidates: Vec<u32> = (0..corners.len() as u32).collect();
+    while !candidates.is_empty() {
+        let above = |limit: f64| {
+            let cloud = &cloud;
+            move |c: &u32| !cloud.is_gap[*c as usize] && cloud.stretch(*c as usize) > limit
+        };
+        let found: Vec<u32> = candidates.into_par_iter().filter(above(threshold)).collect();
+        found.iter().for_each(|c| cloud.is_gap[*c as usize] = true);
+        let points = cloud.points_of(&found);
+        cloud.measure(&points);
+        let beside: Vec<u32> = points.par_iter().flat_map_iter(|p| cloud.neighbours(*p)).collect();
+        candidates = sorted(beside.iter().flat_map(|p| cloud.around.of(*p as usize)).copied());
+    }
+    cloud.grow(GROWTH * threshold);
+    let cells = cloud.is_gap.iter().filter(|g| **g).count();
+    Gaps { is_gap: cloud.is_gap, cells }
+}
+
+/// A triangulation, and what is known of its gaps.
+struct Cloud<'a, const N: usize> {
+    corners: &'a [[u32; N]],
+    around: CellsOfPoints,
+    sizes: Vec<f64>,
+    is_gap: Vec<bool>,
+    /// For each point, the size a third up among the cells around it that are no gaps.
+    own: Vec<f64>,
+    /// The median of `own` over the neighbours.
+    spacing: Vec<f64>,
+}
+
+impl<const N: usize> Cloud<'_, N> {
+    /// Measures the spacing at these points and their neighbours.
+    fn measure(&mut self, points: &[u32]) {
+        let own: Vec<f64> = points
+            .par_iter()
+            .map_init(Vec::new, |values, p| {
+                values.clear();
+                values.extend(self.cells(*p).map(|c| self.sizes[c as usize]));
+                quantile(values, LOWER)
+            })
+            .collect();
+        points.iter().zip(own).for_each(|(p, own)| self.own[*p as usize] = own);
+        let touched = match points.len() == self.own.len() {
+            true => points.to_vec(),
+            false => sorted(points.iter().flat_map(|p| self.neighbours(*p))),
+        };
+        let spacing: Vec<f64> = touched
+            .par_iter()
+            .map_init(Vec::new, |values, p| {
+                values.clear();
+                values.extend(self.neighbours(*p).map(|q| self.own[q as usize]));
+                quantile(values, 0.5)
+            })
+            .collect();
+        touched.iter().zip(spacing).for_each(|(p, s)| self.spacing[*p as usize] = s);
+    }
+
+    /// The cells around a point that are no gaps.
+    fn cells(&self, point: u32) -> impl Iterator<Item = u32> + '_ {
+        self.around.of(point as usize).iter().copied().filter(|c| !self.is_gap[*c as usize])
+    }
+
+    /// The corners of these cells, the point among them, once for each cell.
+    fn neighbours(&self, point: u32) -> impl Iterator<Item = u32> + '_ {
+        self.cells(point).flat_map(|c| self.corners[c as usize])
+    }
+
+    fn points_of(&self, cells: &[u32]) -> Vec<u32> {
+        sorted(cells.iter().flat_map(|c| self.corners[*c as usize]))
+    }
+
+    fn stretch(&self, cell: usize) -> f64 {
+        let spacings = self.corners[cell].map(|p| self.spacing[p as usize]);
+        self.sizes[cell] / spacings.into_iter().fold(0.0, f64::max)
+    }
+
+    /// Lets the gaps grow into neighbours that are wider than `limit`.
+    fn grow(&mut self, limit: f64) {
+        let mut front: Vec<u32> =
+            (0..self.corners.len() as u32).filter(|c| self.is_gap[*c as usize]).collect();
+        while let Some(cell) = front.pop() {
+            let face = self.corners[cell as usize];
+            for skipped in 0..N {
+                for &other in self.around.of(face[(skipped + 1) % N] as usize) {
+                    let shares = |p: &u32| self.corners[other as usize].contains(p);
+                    if !self.is_gap[other as usize]
+                        && self.stretch(other as usize) > limit
+                        && face.iter().enumerate().all(|(i, p)| i == skipped || shares(p))
+                    {
+                        self.is_gap[other as usize] = true;
+                        front.push(other);
+                    }
                 }
             }
         }
     }
-    let cells = is_gap.iter().filter(|g| **g).count();
-    Gaps { is_gap, cells }
+}
+
+/// Numbers in order, each once.
+fn sorted(numbers: impl Iterator<Item = u32>) -> Vec<u32> {
+    let mut all: Vec<u32> = numbers.collect();
+    all.par_sort_unstable();
+    all.dedup();
+    all
 }
 
 /// The largest radius of the circles through three of the corners.

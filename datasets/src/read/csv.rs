@@ -126,13 +126,18 @@ const COMMENT: [char; 2] = ['#', '%'];
 
 /// The separator of a header; the next row tells whether blanks are one.
 fn separator_of(header: &str, next: Option<&str>) -> char {
-    let mark = [',', ';', '\t'].into_iter().find(|&c| header.contains(c));
-    let blanks = || {
-        let count = |line: &str| cells(line, ' ').map_or(0, |c| c.len());
-        let fits = next.is_none_or(|row| count(row) == count(header));
-        if count(header) > 1 && fits { ' ' } else { ',' }
+    let count = |line: &str, separator| cells(line, separator).map_or(0, |c| c.len());
+    let fits = |separator| {
+        next.is_none_or(|row| count(row, separator) == count(header, separator))
+            && count(header, separator) > 1
     };
-    mark.unwrap_or_else(blanks)
+    match [',', ';', '\t'].into_iter().find(|&c| header.contains(c)) {
+        // Columns may be aligned with tabs in the header and with blanks below.
+        Some('\t') if !fits('\t') && fits(' ') => ' ',
+        Some(mark) => mark,
+        None if fits(' ') => ' ',
+        None => ',',
+    }
 }
 
 /// The names in a comment before a row of numbers, and the separator of the row, if the comment has
