@@ -12,8 +12,7 @@ pub(crate) fn read(path: &Path, options: &OpenOptions) -> Result<LoadedFile, Rea
 
 fn from_table(table: &CsvTable, options: &OpenOptions) -> Result<LoadedFile, ReadError> {
     let gap = options.gap.unwrap_or(csv_points::GAP_SPACINGS);
-    // NaN fails the comparison.
-    if !(gap > 0.0) {
+    if gap.is_nan() || gap <= 0.0 {
         let what = format!("it is {gap}");
         let cure = "give a number above 0, such as 2.7, or inf for the whole convex hull";
         let fault = Fault::option(At::Field("the option `gap`".into()), what, cure);
