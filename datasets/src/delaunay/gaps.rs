@@ -14,10 +14,10 @@
 //!    those around most points of its wall. In a boundary layer, the size is half of the distance
 //!    along the wall, however thin the layers are: a circle between two columns of points cannot
 //!    grow through them.
-//! 3. The *stretch* of a cell is its size by the largest spacing at its corners. It is 1 in a lattice,
-//!    and up to 4 among points by chance.
-//! 4. So a cell is a gap where its stretch is more than [`Gaps::spacings`] times the *usual* stretch,
-//!    which four in five of all cells do not exceed. This is repeated, without the cells that were
+//! 3. The *stretch* of a cell is its size by the largest spacing at its corners. It is 1 in a
+//!    lattice, and up to 4 among points by chance.
+//! 4. So a cell is a gap where its stretch is more than `spacings` times the *usual* stretch, which
+//!    four in five of all cells do not exceed. This is repeated, without the cells that were
 //!    found, until no more are: cospherical points of a body may have many cells in it.
 //! 5. From gaps, the place without points goes on into cells next to them with two thirds of that
 //!    (hysteresis, Canny 1986): up to where a body becomes as thin as its points are apart.
@@ -29,7 +29,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Default of [`Gaps::spacings`]. In a lattice, bodies four steps wide are found, and 1 million
+/// Default of `spacings`. In a lattice, bodies four steps wide are found, and 1 million
 /// points by chance have no gap.
 pub(crate) const SPACINGS: f64 = 2.7;
 /// Part of the threshold down to which a gap grows.

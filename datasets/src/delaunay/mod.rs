@@ -2,9 +2,9 @@
 //!
 //! The steps, a file each:
 //!
-//! 1. [`snap`]: coordinates become integers of 40 bits, so that every sign below is exact and cheap.
+//! 1. [`snap`]: coordinates become integers of 40 bits, so that every sign is exact and cheap.
 //! 2. [`hilbert`]: points that are near each other get numbers that are, whatever their order was.
-//! 3. [`plane`] (the crate spade), or [`space`]: points enter one by one (Bowyer 1981, Watson 1981).
+//! 3. [`plane`] (the crate spade), or [`space`]: points enter one by one (Bowyer, Watson 1981).
 //!    Cospherical points are decided by [`predicates`] as Devillers and Teillaud (2003) propose.
 //! 4. [`gaps`]: cells that bridge a place without points are taken away.
 //!

@@ -54,7 +54,8 @@ pub struct PointsReport {
 ///
 /// ```
 /// use datasets::read::{csv, csv_points};
-/// let table = csv::read_from_bytes("t.csv".as_ref(), b"x y T\n0 0 1\n2 0 2\n0 2 3\n1 1 4\n1 -1 5\n")?;
+/// let text = b"x y T\n0 0 1\n2 0 2\n0 2 3\n1 1 4\n1 -1 5\n";
+/// let table = csv::read_from_bytes("t.csv".as_ref(), text)?;
 /// let (data, report) = csv_points::dataset(&table, csv_points::GAP_SPACINGS)?;
 /// assert_eq!((report.points, report.dimensions, report.cells), (5, 2, 3));
 /// assert_eq!(data.kind(), "UnstructuredGrid");
