@@ -29,8 +29,8 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Default of `spacings`. In a lattice, bodies four steps wide are found, and 1 million
-/// points by chance have no gap.
+/// Default of `spacings`. In a lattice, bodies four steps wide are found. Of seven
+/// clouds of 30,000 points by chance in a square, one had such a place inside, of three cells.
 pub(crate) const SPACINGS: f64 = 2.7;
 /// Part of the threshold down to which a gap grows.
 const GROWTH: f64 = 2.0 / 3.0;
