@@ -20,6 +20,7 @@ pub mod catalogue;
 #[cfg(feature = "cli")]
 pub mod cli;
 pub mod colormaps;
+mod delaunay;
 pub mod generate;
 pub mod image_io;
 pub mod isosurface;

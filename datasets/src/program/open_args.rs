@@ -17,6 +17,10 @@ pub(super) struct OpenArgs {
     /// Position of the first point of such a file
     #[arg(long, value_name = "X,Y,Z", value_parser = three, allow_hyphen_values = true)]
     origin: Option<[f64; 3]>,
+    /// For a table of points in no order (.csv .tsv .txt): how many times as wide as the cells
+    /// around it a place without points is a hole; `inf` keeps the whole convex hull [default: 2.7]
+    #[arg(long, value_name = "SPACINGS")]
+    gap: Option<f64>,
 }
 
 impl OpenArgs {
@@ -26,7 +30,8 @@ impl OpenArgs {
     }
 
     pub(super) fn options(&self) -> OpenOptions {
-        OpenOptions { time: self.time, spacing: self.spacing, origin: self.origin }
+        let OpenArgs { time, spacing, origin, gap } = *self;
+        OpenOptions { time, spacing, origin, gap }
     }
 }
 

@@ -1,9 +1,10 @@
 //! Tables as text: a line of column names, then one row per line. Cells are separated by commas, or
-//! by semicolons or tabs if the header uses them instead.
+//! by semicolons or tabs if the header uses them instead, or by blanks if it has none of these.
 //!
 //! Cells may be quoted (`"a, b"`, a quote inside is doubled) but not contain line breaks. Empty
-//! lines and lines that begin with `#` are skipped. Callers request columns by name, so their order
-//! does not matter.
+//! lines and lines that begin with `#` or `%` are skipped; without another header, the last of them
+//! before the numbers is one (NumPy, COMSOL). In exports of CFD-Post, the table is the section
+//! `[Data]`. Callers request columns by name, so their order does not matter.
 //!
 //! The lexer is our own because the crate csv does not reject broken quotes: see the book,
 //! "Decisions and their reasons".
@@ -51,17 +52,35 @@ fn parse(path: &Path, bytes: &[u8]) -> Result<CsvTable, Fault> {
         )
     })?;
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-    let numbered = text.lines().enumerate().map(|(i, l)| (i as u64 + 1, l));
-    let mut lines =
-        numbered.filter(|(_, l)| !l.trim().is_empty() && !l.trim_start().starts_with('#'));
+    let numbered = || text.lines().enumerate().map(|(i, l)| (i as u64 + 1, l));
+    let is_section = |l: &str| l.trim().starts_with('[') && l.trim().ends_with(']');
+    let data = numbered().find(|(_, l)| l.trim().eq_ignore_ascii_case("[data]"));
+    let (start, has_sections) = data.map_or((0, false), |(line, _)| (line, true));
+    let numbered = numbered()
+        .skip(start as usize)
+        .take_while(move |(_, l)| !(has_sections && is_section(l)))
+        .filter(|(_, l)| !l.trim().is_empty());
+    let is_comment = |l: &str| l.trim_start().starts_with(COMMENT);
+    let mut lines = numbered.clone().filter(|(_, l)| !is_comment(l)).peekable();
 
     // The header.
-    let Some((header_line, header)) = lines.next() else {
+    let Some(&(first_line, first)) = lines.peek() else {
         let cure = "the first line must name the columns, such as `x,y,value`";
         return Err(Fault::new(At::Line(1), "there are no lines with content", cure));
     };
-    let separator = [',', ';', '\t'].into_iter().find(|&c| header.contains(c)).unwrap_or(',');
-    let columns = cells(header, separator).map_err(|what| unclosed(header_line, what))?;
+    let comment = numbered.take_while(|(line, _)| *line < first_line).last();
+    let (header_line, header, separator) = match comment.and_then(|c| header_in(c.1, first)) {
+        Some((header, separator)) => (first_line - 1, header, separator),
+        None => {
+            lines.next();
+            let second = lines.peek().map(|l| l.1);
+            (first_line, first, separator_of(first, second))
+        }
+    };
+    let columns = match header_line == first_line {
+        true => cells(header, separator).map_err(|what| unclosed(header_line, what))?,
+        false => cells(header, separator_of(header, None)).unwrap_or_default(),
+    };
     for (i, name) in columns.iter().enumerate() {
         let at = At::Line(header_line);
         if name.is_empty() {
@@ -102,6 +121,37 @@ fn parse(path: &Path, bytes: &[u8]) -> Result<CsvTable, Fault> {
     Ok(CsvTable { path: path.to_path_buf(), separator, header: header.to_string(), columns, rows })
 }
 
+/// Characters that begin a comment.
+const COMMENT: [char; 2] = ['#', '%'];
+
+/// The separator of a header; the next row tells whether blanks are one.
+fn separator_of(header: &str, next: Option<&str>) -> char {
+    let count = |line: &str, separator| cells(line, separator).map_or(0, |c| c.len());
+    let fits = |separator| {
+        next.is_none_or(|row| count(row, separator) == count(header, separator))
+            && count(header, separator) > 1
+    };
+    match [',', ';', '\t'].into_iter().find(|&c| header.contains(c)) {
+        // Columns may be aligned with tabs in the header and with blanks below.
+        Some('\t') if !fits('\t') && fits(' ') => ' ',
+        Some(mark) => mark,
+        None if fits(' ') => ' ',
+        None => ',',
+    }
+}
+
+/// The names in a comment before a row of numbers, and the separator of the row, if the comment has
+/// a name for each.
+fn header_in<'a>(comment: &'a str, row: &str) -> Option<(&'a str, char)> {
+    let separator = separator_of(row, None);
+    let numbers = cells(row, separator).ok()?;
+    let header = comment.trim_start().trim_start_matches(COMMENT).trim();
+    let names = cells(header, separator_of(header, None)).ok()?;
+    let all_numbers = numbers.iter().all(|n| n.parse::<f64>().is_ok());
+    let fits = all_numbers && names.len() == numbers.len() && numbers.len() > 1;
+    fits.then_some((header, separator))
+}
+
 fn unclosed(line: u64, cell: String) -> Fault {
     let shown: String = cell.chars().take(40).collect();
     let what = format!("the quoted cell `{shown}` has no closing quote, or text after it");
@@ -111,6 +161,9 @@ fn unclosed(line: u64, cell: String) -> Fault {
 /// Splits a line into cells without surrounding space and quotes; `Err` holds the cell whose quotes
 /// are invalid.
 fn cells(line: &str, separator: char) -> Result<Vec<String>, String> {
+    if separator == ' ' {
+        return blank_cells(line);
+    }
     let mut out = Vec::new();
     let mut rest = line;
     loop {
@@ -152,6 +205,24 @@ fn cells(line: &str, separator: char) -> Result<Vec<String>, String> {
     }
 }
 
+/// As [`cells`], where blanks separate.
+fn blank_cells(line: &str) -> Result<Vec<String>, String> {
+    let mut out = Vec::new();
+    let mut rest = line.trim();
+    while !rest.is_empty() {
+        let (cell, next) = match rest.strip_prefix('"') {
+            Some(quoted) => quoted.split_once('"').ok_or_else(|| quoted.to_string())?,
+            None => rest.split_at(rest.find(char::is_whitespace).unwrap_or(rest.len())),
+        };
+        if !next.is_empty() && !next.starts_with(char::is_whitespace) {
+            return Err(cell.to_string());
+        }
+        out.push(cell.to_string());
+        rest = next.trim_start();
+    }
+    Ok(out)
+}
+
 impl CsvTable {
     /// The file.
     pub fn path(&self) -> &Path {
@@ -161,7 +232,7 @@ impl CsvTable {
     pub fn columns(&self) -> &[String] {
         &self.columns
     }
-    /// The separator between cells.
+    /// The separator between cells; a blank stands for any number of blanks and tabs.
     pub fn separator(&self) -> char {
         self.separator
     }
@@ -220,22 +291,23 @@ impl CsvTable {
     /// ```
     pub fn numbers(&self, name: &str) -> Result<Vec<f64>, ReadError> {
         let column = self.column_index(name)?;
-        self.rows
-            .iter()
-            .map(|row| {
-                let cell = &row.cells[column];
-                cell.parse::<f64>().ok().filter(|x| x.is_finite()).ok_or_else(|| {
-                    let cure = if cell.is_empty() {
-                        "fill it in, or remove the row"
-                    } else if cell.contains(',') {
-                        "write the number with a decimal point"
-                    } else {
-                        "write a number, without its unit"
-                    };
-                    self.fault(row.line, name, cell, "is not a number", cure)
-                })
-            })
-            .collect()
+        (0..self.len()).map(|row| self.number(row, column)).collect()
+    }
+
+    /// The number in a cell; panics when out of range.
+    pub(crate) fn number(&self, row: usize, column: usize) -> Result<f64, ReadError> {
+        let Row { line, cells, .. } = &self.rows[row];
+        let cell = &cells[column];
+        cell.parse::<f64>().ok().filter(|x| x.is_finite()).ok_or_else(|| {
+            let cure = if cell.is_empty() {
+                "fill it in, or remove the row"
+            } else if cell.contains(',') {
+                "write the number with a decimal point"
+            } else {
+                "write a number, without its unit"
+            };
+            self.fault(*line, &self.columns[column], cell, "is not a number", cure)
+        })
     }
 
     /// Makes an error about the value in a cell, for checks by callers.
@@ -282,6 +354,27 @@ mod tests {
         assert_eq!(table("x\n1\n").unwrap().numbers("x").unwrap(), [1.0]);
         assert_eq!(table("x\ty\n1\t2\n").unwrap().numbers("y").unwrap(), [2.0]);
         assert_eq!(table("x\ty\n\t2\n").unwrap().cell(0, 1), "2");
+    }
+
+    #[test]
+    fn blanks_comments_with_names_and_sections() {
+        let t = table("nodenumber  x-coordinate\ty-coordinate\n 1   0.5 -2e-1\n2 1 3 \n").unwrap();
+        assert_eq!((t.columns()[1].as_str(), t.separator(), t.len()), ("x-coordinate", ' ', 2));
+        let t = table("nodenumber  x y\n 1   0.5 -2e-1\n2\t1 3 \n").unwrap();
+        assert_eq!((t.columns().len(), t.separator(), t.len()), (3, ' ', 2));
+        assert_eq!(t.numbers("y").unwrap(), [-0.2, 3.0]);
+        let t = table("\"X (m)\" \"T (K)\"\n0 300\n").unwrap();
+        assert_eq!(t.columns(), ["X (m)", "T (K)"]);
+        // NumPy's and COMSOL's header is a comment.
+        for text in ["# x y rho\n1 2 3\n", "% made\n%  x,y, rho\n1;2;3\n", "#x y rho\n1,2,3\n"] {
+            let t = table(text).unwrap();
+            assert_eq!((t.columns(), t.len()), (&["x", "y", "rho"].map(String::from)[..], 1));
+        }
+        let t = table("[Name]\nPlane 1\n\n[Data]\nX [ m ], T [ K ]\n0,1\n\n[Faces]\n0, 1, 2\n")
+            .unwrap();
+        assert_eq!((t.columns()[0].as_str(), t.len(), t.line(0)), ("X [ m ]", 1, 6));
+        // One column whose name has a blank.
+        assert_eq!(table("the value\n1\n").unwrap().columns(), ["the value"]);
     }
 
     #[test]

@@ -3,18 +3,13 @@
 
 use super::ReadError;
 use super::csv::{CsvTable, FORMAT};
+use super::csv_columns::{Columns, array};
 use super::error::{At, Fault};
-use crate::model::{Attributes, DataArray, Dataset, RectilinearGrid, Values};
-
-/// Names of the coordinate columns, case-insensitive. `Points:0` is ParaView's.
-const COORDINATES: [&[&str]; 3] = [
-    &["x", "x_m", "Points:0", "Points_0"],
-    &["y", "y_m", "Points:1", "Points_1"],
-    &["z", "z_m", "Points:2", "Points_2"],
-];
+use crate::model::{Attributes, Dataset, RectilinearGrid};
 
 /// Converts the table to a rectilinear grid: every combination of its x, y and z must occur once,
-/// in any order. All other columns of numbers become point arrays. A missing z (or y) is 0.
+/// in any order. All other columns of numbers become point arrays. A missing z (or y) is 0, and a
+/// missing value is NaN.
 ///
 /// ```
 /// use datasets::read::{csv, csv_lattice};
@@ -25,38 +20,42 @@ const COORDINATES: [&[&str]; 3] = [
 /// # Ok::<(), datasets::read::ReadError>(())
 /// ```
 pub fn dataset(table: &CsvTable) -> Result<Dataset, ReadError> {
-    let fault = |what: String, cure: &str| {
-        Fault::new(At::Field("the table".into()), what, cure).in_file(table.path(), FORMAT)
-    };
-    let mut is_coordinate = vec![false; table.columns().len()];
+    let columns = Columns::find(table)?;
+    match lattice(table, &columns)? {
+        Ok((data, _)) => Ok(data),
+        Err(NotLattice(what, cure)) => {
+            let at = At::Field("the table".into());
+            Err(Fault::new(at, what, cure).in_file(table.path(), FORMAT))
+        }
+    }
+}
+
+/// The lattice of the table, if it is one, and how many values are missing.
+pub(crate) fn find(table: &CsvTable) -> Result<Option<(Dataset, usize)>, ReadError> {
+    Ok(lattice(table, &Columns::find(table)?)?.ok())
+}
+
+/// Why a table is not a lattice, and the cure.
+struct NotLattice(String, &'static str);
+
+fn lattice(
+    table: &CsvTable,
+    columns: &Columns,
+) -> Result<Result<(Dataset, usize), NotLattice>, ReadError> {
     let mut of_rows: Vec<Vec<f64>> = Vec::new();
-    let mut coordinates: Vec<Vec<f64>> = Vec::new();
-    for (axis, names) in COORDINATES.iter().enumerate() {
-        let found =
-            table.columns().iter().position(|c| names.iter().any(|n| n.eq_ignore_ascii_case(c)));
-        let values = match found {
-            Some(i) => {
-                is_coordinate[i] = true;
-                table.numbers(&table.columns()[i])?
-            }
-            None if axis > 0 => vec![0.0; table.len()],
-            None => {
-                return Err(fault(
-                    "there is no column with coordinates".into(),
-                    "name those x, y and z",
-                ));
-            }
-        };
-        let mut distinct = values.clone();
+    let mut coordinates: [Vec<f64>; 3] = Default::default();
+    for (axis, distinct) in coordinates.iter_mut().enumerate() {
+        let values = columns.along(table, axis)?;
+        distinct.clone_from(&values);
         distinct.sort_by(f64::total_cmp);
         // −0 and 0 are the same coordinate.
         distinct.dedup_by(|a, b| a == b);
         of_rows.push(values);
-        coordinates.push(distinct);
     }
     let dims = [0, 1, 2].map(|a| coordinates[a].len());
     let cells = dims.iter().try_fold(1usize, |n, &d| n.checked_mul(d));
-    if cells != Some(table.len()) || table.is_empty() {
+    let has_gap = coordinates.iter().flatten().any(|x| x.is_nan());
+    if cells != Some(table.len()) || table.is_empty() || has_gap {
         let what = format!(
             "{} rows, but {} x {} x {} different coordinates: the points are not a lattice",
             table.len(),
@@ -64,7 +63,8 @@ pub fn dataset(table: &CsvTable) -> Result<Dataset, ReadError> {
             dims[1],
             dims[2]
         );
-        return Err(fault(what, "export the mesh itself (.vtu, .vts), or points on a lattice"));
+        let cure = "export the mesh itself (.vtu, .vts), or points on a lattice";
+        return Ok(Err(NotLattice(what, cure)));
     }
 
     // The row of each lattice point.
@@ -73,35 +73,28 @@ pub fn dataset(table: &CsvTable) -> Result<Dataset, ReadError> {
         let at = [0, 1, 2].map(|a| coordinates[a].partition_point(|x| *x < of_rows[a][row]));
         let slot = &mut row_of[at[0] + dims[0] * (at[1] + dims[1] * at[2])];
         if *slot != usize::MAX {
-            let what = format!(
-                "lines {} and {} have the same coordinates",
-                table.line(*slot),
-                table.line(row)
-            );
-            return Err(fault(what, "remove one of them"));
+            let (first, second) = (table.line(*slot), table.line(row));
+            let what = format!("lines {first} and {second} have the same coordinates");
+            return Ok(Err(NotLattice(what, "remove one of them")));
         }
         *slot = row;
     }
 
     let mut attributes = Attributes::default();
-    for (i, name) in table.columns().iter().enumerate().filter(|(i, _)| !is_coordinate[*i]) {
-        // Text columns are ignored; a missing number in a column of numbers is an error.
-        if table.cell(0, i).parse::<f64>().is_err() {
-            continue;
-        }
-        let values = table.numbers(name)?;
-        let ordered = row_of.iter().map(|&r| values[r]).collect();
-        attributes.point.push(DataArray::new(name.clone(), 1, Values::F64(ordered)));
+    let mut missing = 0;
+    for (name, values) in columns.values(table)? {
+        missing += values.iter().filter(|v| v.is_nan()).count();
+        attributes.point.push(array(&name, row_of.iter().map(|&r| values[r]).collect()));
     }
     let extent = [0, dims[0] as i32 - 1, 0, dims[1] as i32 - 1, 0, dims[2] as i32 - 1];
-    let coordinates =
-        coordinates.try_into().unwrap_or_else(|_| unreachable!("three axes were pushed"));
-    Ok(Dataset::RectilinearGrid(RectilinearGrid { extent, coordinates, attributes }))
+    let grid = RectilinearGrid { extent, coordinates, attributes };
+    Ok(Ok((Dataset::RectilinearGrid(grid), missing)))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::Values;
     use crate::read::csv;
     use std::path::Path;
 
@@ -132,7 +125,8 @@ mod tests {
             ("x,y,T\n0,0,1\n0,0,2\n", "not a lattice"),
             ("x,y,T\n0,0,1\n0,1,2\n1,0,3\n1,0,4\n", "lines 4 and 5 have the same coordinates"),
             ("x,T\n", "not a lattice"),
-            ("x,T\n0,1\n1,\n", "fill it in"),
+            ("x,T\n0,1\n,2\n", "not a lattice"),
+            ("x,T\n0,1\n1,warm\n", "in line 3: column `T`: `warm` is not a number"),
         ] {
             let error = read(text).unwrap_err();
             assert!(error.contains(word), "{text:?}: {error}");

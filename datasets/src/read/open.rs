@@ -2,8 +2,9 @@
 
 use super::error::{Fault, io_error, read_bytes};
 use super::{
-    LoadedFile, OpenOptions, ReadError, amrex, cgns, ensight, gltf, hdf5, mhd, netcdf, npy, nrrd,
-    obj, openfoam, plot3d, ply, raw, stl, tecplot, time_axis, vtk_legacy, vtk_xml, vtkhdf, xdmf,
+    LoadedFile, OpenOptions, ReadError, amrex, cgns, csv, csv_file, ensight, gltf, hdf5, mhd,
+    netcdf, npy, nrrd, obj, openfoam, plot3d, ply, raw, stl, tecplot, time_axis, vtk_legacy,
+    vtk_xml, vtkhdf, xdmf,
 };
 use std::io::Read;
 use std::path::Path;
@@ -15,7 +16,7 @@ pub const KNOWN: &str = "VTK XML (.vti .vtp .vtu .vtr .vts, their parallel forms
                          PLOT3D (.xyz .x .g .q .bin), NRRD (.nrrd .nhdr), MetaImage (.mhd .mha), \
                          raw with TOML (.raw), NumPy (.npy .npz), OpenFOAM cases (folders, .foam), \
                          Tecplot (.dat .tec .plt), EnSight Gold (.case), \
-                         AMReX plotfiles (folders), OBJ, glTF, PLY, STL";
+                         AMReX plotfiles (folders), tables of points (.csv .tsv .txt), OBJ, glTF, PLY, STL";
 
 /// Number of bytes examined.
 const HEAD_BYTES: u64 = 1024;
@@ -40,6 +41,7 @@ enum Format {
     Tecplot,
     EnSight,
     Cgns,
+    Csv,
 }
 
 impl Format {
@@ -73,6 +75,7 @@ impl Format {
             Format::Tecplot => tecplot::FORMAT,
             Format::EnSight => ensight::FORMAT,
             Format::Cgns => cgns::FORMAT,
+            Format::Csv => csv::FORMAT,
         }
     }
 }
@@ -102,9 +105,11 @@ pub fn open(path: impl AsRef<Path>) -> Result<LoadedFile, ReadError> {
 pub fn open_with(path: impl AsRef<Path>, options: &OpenOptions) -> Result<LoadedFile, ReadError> {
     let path = path.as_ref();
     if amrex::header_of(path).is_some() {
+        options.refuse_gap().map_err(|f| f.in_file(path, amrex::FORMAT))?;
         return amrex::read(path, options);
     }
     if openfoam::is_case(path) || path.is_dir() {
+        options.refuse_gap().map_err(|f| f.in_file(path, openfoam::FORMAT))?;
         return openfoam::read(path, options);
     }
     if let Some((file, time)) = time_axis::time_of_file(path) {
@@ -138,6 +143,9 @@ pub fn open_with(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Loaded
     if !takes_lattice.contains(&format) {
         options.refuse_lattice().map_err(|f| f.in_file(path, format.name()))?;
     }
+    if format != Format::Csv {
+        options.refuse_gap().map_err(|f| f.in_file(path, format.name()))?;
+    }
     if !format.may_have_times() {
         options.refuse_time().map_err(|f| f.in_file(path, format.name()))?;
     }
@@ -160,6 +168,7 @@ pub fn open_with(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Loaded
         Format::Tecplot => tecplot::read(path, options),
         Format::EnSight => ensight::read(path, options),
         Format::Cgns => cgns::read(path, options),
+        Format::Csv => csv_file::read(path, options),
     }?;
     // `.g` is PLOT3D's and Exodus II's.
     if let (Some(content), Some(name)) = (by_content, by_name)
@@ -257,6 +266,7 @@ fn from_name(path: &Path) -> Option<Format> {
         "tec" | "plt" => Format::Tecplot,
         "case" | "encas" => Format::EnSight,
         "cgns" => Format::Cgns,
+        "csv" | "tsv" | "txt" => Format::Csv,
         _ => return None,
     })
 }

@@ -16,6 +16,10 @@ pub struct OpenOptions {
     pub spacing: Option<[f64; 3]>,
     /// Position of the first point, for the same files.
     pub origin: Option<[f64; 3]>,
+    /// For tables of points in no order (CSV): a place without points is none of the flow where it
+    /// is this many times as wide as the cells around it ([`super::csv_points`]). Infinity keeps
+    /// the whole convex hull.
+    pub gap: Option<f64>,
 }
 
 impl OpenOptions {
@@ -46,6 +50,14 @@ impl OpenOptions {
             image.origin = self.origin.map_or(image.origin, DVec3::from_array);
         }
         Ok(())
+    }
+
+    /// A fault if there is a gap.
+    pub(crate) fn refuse_gap(&self) -> Result<(), Fault> {
+        match self.gap {
+            Some(g) => Err(refused("gap", g, "the file is no table of points: leave it out")),
+            None => Ok(()),
+        }
     }
 
     /// A fault if there is a time.

@@ -118,7 +118,7 @@ impl Flow {
         spacing: Option<[f64; 3]>,
         origin: Option<[f64; 3]>,
     ) -> PyResult<Flow> {
-        let open = OpenOptions { time: None, spacing, origin };
+        let open = OpenOptions { spacing, origin, ..OpenOptions::default() };
         let read = run(py, 0, |_| schlieren::input::dataset(&path, &open))?;
         let (data, notes) = read.map_err(|e| errors::of_input(&e))?;
         Ok(Flow::of(data, notes))

@@ -69,6 +69,10 @@ pub(super) struct FlowArgs {
     /// Position of the first point of such a file
     #[arg(long, value_name = "X,Y,Z", value_parser = units::three, allow_hyphen_values = true)]
     origin: Option<[f64; 3]>,
+    /// For a table of points in no order (.csv .tsv .txt): how many times as wide as the cells
+    /// around it a place without points is a hole; `inf` keeps the whole convex hull [default: 2.7]
+    #[arg(long, value_name = "SPACINGS")]
+    gap: Option<f64>,
     /// Depth of two-dimensional data, in units of the file
     #[arg(long, value_name = "NUMBER")]
     span: Option<f64>,
@@ -139,6 +143,7 @@ impl FlowArgs {
         f.pressure_zero_pa = a.pressure_zero.or(f.pressure_zero_pa);
         f.spacing = a.spacing.or(f.spacing);
         f.origin = a.origin.or(f.origin);
+        f.gap = a.gap.or(f.gap);
         f.length_unit_m = a.length_unit.unwrap_or(f.length_unit_m);
         f.span = a.span.or(f.span.filter(|_| !a.revolve));
         f.revolve = a.revolve || (f.revolve && a.span.is_none());

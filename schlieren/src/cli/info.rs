@@ -23,6 +23,10 @@ pub(super) struct InfoArgs {
     /// Position of the first point of such a file
     #[arg(long, value_name = "X,Y,Z", value_parser = units::three, allow_hyphen_values = true)]
     origin: Option<[f64; 3]>,
+    /// For a table of points in no order (.csv .tsv .txt): how many times as wide as the cells
+    /// around it a place without points is a hole; `inf` keeps the whole convex hull [default: 2.7]
+    #[arg(long, value_name = "SPACINGS")]
+    gap: Option<f64>,
 }
 
 #[derive(Serialize)]
@@ -35,7 +39,8 @@ struct Info<'a> {
 }
 
 pub(super) fn info(common: CommonArgs, args: &InfoArgs) -> anyhow::Result<()> {
-    let open = OpenOptions { time: None, spacing: args.spacing, origin: args.origin };
+    let InfoArgs { spacing, origin, gap, .. } = *args;
+    let open = OpenOptions { time: None, spacing, origin, gap };
     let contents = contents(&args.file, &open)?;
     let command = command(&args.file, &open, &contents);
     let info = Info { file: &args.file, contents: &contents, command };
@@ -55,6 +60,7 @@ fn command(file: &Path, open: &OpenOptions, contents: &Contents) -> Option<Strin
             words.push(format!("{option}={x},{y},{z}"));
         }
     }
+    words.extend(open.gap.map(|gap| format!("--gap={gap}")));
     words.extend(["-o".into(), "flow.png".into()]);
     Some(words.iter().map(|w| quoted(w)).collect::<Vec<_>>().join(" "))
 }

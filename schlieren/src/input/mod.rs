@@ -290,17 +290,6 @@ fn with_data<T>(
 ) -> Result<(T, Vec<String>), InputError> {
     let in_file =
         |e: InputError| InputError::InFile { path: path.to_path_buf(), source: Box::new(e) };
-    // A table of points on a lattice: cell centres of a solver, or an export from ParaView.
-    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv")) {
-        if *file != OpenOptions::default() {
-            return Err(in_file(InputError::Option {
-                what: "a spacing or an origin is given".into(),
-                cure: "omit it: a table has the places of its values",
-            }));
-        }
-        let data = datasets::read::csv_lattice::dataset(&datasets::read::csv::read(path)?)?;
-        return Ok((make(&data).map_err(in_file)?, Vec::new()));
-    }
     let opened = datasets::read::open_with(path, file)?;
     let data = opened.dataset().map_err(|e| in_file(e.into()))?;
     Ok((make(data).map_err(in_file)?, opened.warnings))

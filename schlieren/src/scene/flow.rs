@@ -72,6 +72,10 @@ pub struct FlowSpec {
     /// Position of the first point of such a file, in its units.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub origin: Option<[f64; 3]>,
+    /// For a table of points in no order: how many times as wide as the cells around it a place
+    /// without points is a hole.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gap: Option<f64>,
     /// Depth to which two-dimensional data are extruded, in units of the file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub span: Option<f64>,
@@ -167,6 +171,7 @@ impl Default for FlowSpec {
             model: Model::Auto,
             length_unit_m: one(),
             spacing: None,
+            gap: None,
             origin: None,
             span: None,
             revolve: false,
@@ -197,6 +202,7 @@ impl FlowSpec {
             file: self.file.clone(),
             length_unit_m: self.length_unit_m,
             spacing: self.spacing,
+            gap: self.gap,
             origin: self.origin,
             span: self.span,
             revolve: self.revolve,
@@ -329,7 +335,7 @@ impl FlowSpec {
 
     /// What the file does not say itself.
     pub fn open_options(&self) -> OpenOptions {
-        OpenOptions { time: None, spacing: self.spacing, origin: self.origin }
+        OpenOptions { time: None, spacing: self.spacing, origin: self.origin, gap: self.gap }
     }
 
     /// Options for reading the file as a field for light of this wavelength.

@@ -1,0 +1,43 @@
+//! Opens a table of points: as the lattice that they are, or else as the mesh between them.
+
+use super::csv::{self, CsvTable, FORMAT};
+use super::error::{At, Fault};
+use super::{Content, LoadedFile, OpenOptions, ReadError, csv_columns, csv_lattice, csv_points};
+use std::path::Path;
+
+/// Reads a table.
+pub(crate) fn read(path: &Path, options: &OpenOptions) -> Result<LoadedFile, ReadError> {
+    from_table(&csv::read(path)?, options)
+}
+
+fn from_table(table: &CsvTable, options: &OpenOptions) -> Result<LoadedFile, ReadError> {
+    let gap = options.gap.unwrap_or(csv_points::GAP_SPACINGS);
+    if gap.is_nan() || gap <= 0.0 {
+        let what = format!("it is {gap}");
+        let cure = "give a number above 0, such as 2.7, or inf for the whole convex hull";
+        let fault = Fault::option(At::Field("the option `gap`".into()), what, cure);
+        return Err(fault.in_file(table.path(), FORMAT));
+    }
+    let mut warnings = Vec::new();
+    let data = match csv_lattice::find(table)? {
+        Some((data, missing)) => {
+            if missing > 0 {
+                warnings
+                    .push(format!("{missing} values are missing and stay without a number (NaN)"));
+            }
+            data
+        }
+        None => {
+            let (data, report) = csv_points::dataset(table, gap)?;
+            warnings.extend(report.sentences(gap));
+            data
+        }
+    };
+    if let Some((unit, metres)) = csv_columns::Columns::find(table)?.unit {
+        warnings.push(format!(
+            "the coordinates are in {unit} by their names and stay so; a length unit of {metres} \
+             makes them metres"
+        ));
+    }
+    Ok(LoadedFile { format: FORMAT, content: Content::Data(data), warnings, time_steps: vec![] })
+}

@@ -1,0 +1,235 @@
+//! Converts tables of points in no order to meshes: triangles in a plane, tetrahedra in space.
+
+use super::ReadError;
+use super::csv::{CsvTable, FORMAT};
+use super::csv_columns::{Columns, array};
+use super::error::{At, Fault};
+use crate::delaunay::gaps::{self, Gaps};
+use crate::delaunay::snap::Snapped;
+use crate::delaunay::{Degenerate, tetrahedra, triangles};
+use crate::model::{Attributes, Cells, Dataset, Points, UnstructuredGrid};
+use glam::DVec3;
+
+/// Default of the width of a gap ([`dataset`]).
+pub const GAP_SPACINGS: f64 = gaps::SPACINGS;
+
+/// Side of a box by its longest one below which it is rounding, and the points lie in a plane.
+const FLAT: f64 = 1e-6;
+
+/// VTK's types of a triangle and a tetrahedron.
+const TRIANGLE: u8 = 5;
+const TETRAHEDRON: u8 = 10;
+
+/// How a table of points became a mesh.
+#[derive(Debug, Clone, Default, PartialEq)]
+#[non_exhaustive]
+pub struct PointsReport {
+    /// Points of the mesh.
+    pub points: usize,
+    /// 2 in a plane, 3 in space.
+    pub dimensions: usize,
+    /// Rows left out because a coordinate is missing.
+    pub rows_without_place: usize,
+    /// Rows at the place of another one; the point has their mean.
+    pub joined_rows: usize,
+    /// Those with values that differ from the other row's.
+    pub joined_with_other_values: usize,
+    /// Missing values, which are NaN in the mesh.
+    pub missing_values: usize,
+    /// Triangles or tetrahedra of the mesh.
+    pub cells: usize,
+    /// Cells of the convex hull that are none of the mesh: they bridge a place without points.
+    pub gap_cells: usize,
+    /// Points that are corners of such cells only.
+    pub lonely_points: usize,
+}
+
+/// Converts a table to an unstructured grid by Delaunay triangulation. Cells that bridge a place
+/// without points are left out where it is `gap` times as wide as the cells around it; infinity
+/// keeps the whole convex hull. All columns of numbers become point arrays. Points are in the order
+/// of a Hilbert curve, so the mesh does not depend on the order of the rows.
+///
+/// # Errors
+/// If there is no x, a cell is not a number, or all points lie on a line or in a slanting plane.
+///
+/// ```
+/// use datasets::read::{csv, csv_points};
+/// let text = b"x y T\n0 0 1\n2 0 2\n0 2 3\n1 1 4\n1 -1 5\n";
+/// let table = csv::read_from_bytes("t.csv".as_ref(), text)?;
+/// let (data, report) = csv_points::dataset(&table, csv_points::GAP_SPACINGS)?;
+/// assert_eq!((report.points, report.dimensions, report.cells), (5, 2, 3));
+/// assert_eq!(data.kind(), "UnstructuredGrid");
+/// # Ok::<(), datasets::read::ReadError>(())
+/// ```
+pub fn dataset(table: &CsvTable, gap: f64) -> Result<(Dataset, PointsReport), ReadError> {
+    let columns = Columns::find(table)?;
+    let mut report = PointsReport::default();
+    let axes: [Vec<f64>; 3] =
+        [columns.along(table, 0)?, columns.along(table, 1)?, columns.along(table, 2)?];
+    let mut values = columns.values(table)?;
+
+    // Rows with a place.
+    let at = |row: usize| [axes[0][row], axes[1][row], axes[2][row]];
+    let rows: Vec<usize> =
+        (0..table.len()).filter(|r| at(*r).iter().all(|x| x.is_finite())).collect();
+    report.rows_without_place = table.len() - rows.len();
+    let mut points: Vec<[f64; 3]> = rows.iter().map(|r| at(*r)).collect();
+    values.iter_mut().for_each(|(_, v)| *v = rows.iter().map(|r| v[*r]).collect());
+
+    // The axis that the points do not extend along comes last, for a triangulation in the plane.
+    let fault = |what: String, cure: &str| {
+        Fault::new(At::Field("the table".into()), what, cure).in_file(table.path(), FORMAT)
+    };
+    if u32::try_from(points.len()).is_err() {
+        return Err(fault(format!("{} points are too many", points.len()), "thin them out"));
+    }
+    let flat = flat_axis(&points);
+    report.dimensions = if flat.is_some() { 2 } else { 3 };
+    let turned = flat.map_or([0, 1, 2], |flat| [(flat + 1) % 3, (flat + 2) % 3, flat]);
+    if let Some(flat) = flat {
+        let low = points.iter().map(|p| p[flat]).fold(f64::INFINITY, f64::min);
+        points.iter_mut().for_each(|p| p[flat] = low);
+    }
+    let turned: Vec<[f64; 3]> = points.iter().map(|p| turned.map(|a| p[a])).collect();
+    let snapped = Snapped::new(&turned);
+    let joined = join(&snapped, &points, &values, &mut report);
+
+    // The cells.
+    let cells = match flat {
+        Some(_) => triangles(&snapped).map(|c| kept(&joined.places, &c, gap, &mut report)),
+        None => tetrahedra(&snapped).map(|c| kept(&joined.places, &c, gap, &mut report)),
+    };
+    let cells = cells.map_err(|degenerate| {
+        let count = snapped.len();
+        match degenerate {
+            Degenerate::Line => fault(
+                format!("{count} different points, all on one line"),
+                "give points of a plane or of space, three or more",
+            ),
+            Degenerate::Plane => fault(
+                format!("{count} different points in a plane that slants to the axes"),
+                "turn them into the plane of x and y, and leave z out",
+            ),
+        }
+    })?;
+    let mut has_cell = vec![false; snapped.len()];
+    cells.connectivity().iter().for_each(|p| has_cell[*p as usize] = true);
+    report.points = snapped.len();
+    report.lonely_points = has_cell.iter().filter(|c| !**c).count();
+
+    let kind = if flat.is_some() { TRIANGLE } else { TETRAHEDRON };
+    let attributes = Attributes { point: joined.arrays, ..Attributes::default() };
+    let grid = UnstructuredGrid {
+        points: Points::F64(joined.places.iter().map(|p| p.to_array()).collect()),
+        types: vec![kind; cells.len()],
+        cells,
+        attributes,
+        ..UnstructuredGrid::default()
+    };
+    Ok((Dataset::UnstructuredGrid(grid), report))
+}
+
+/// The axis along which the points extend by no more than rounding.
+fn flat_axis(points: &[[f64; 3]]) -> Option<usize> {
+    let side = [0, 1, 2].map(|a| {
+        let along = points.iter().map(|p| p[a]);
+        let (low, high) =
+            along.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+        0.5 * high - 0.5 * low
+    });
+    let longest = side.into_iter().fold(0.0, f64::max);
+    // z rather than the others, should the points be on a line.
+    (0..3).rev().find(|a| side[*a] <= FLAT * longest || points.is_empty())
+}
+
+/// Places with one point each.
+struct Joined {
+    places: Vec<DVec3>,
+    arrays: Vec<crate::model::DataArray>,
+}
+
+/// Joins the rows of each place: the first of their coordinates, and the mean of their values.
+fn join(
+    snapped: &Snapped,
+    points: &[[f64; 3]],
+    values: &[(String, Vec<f64>)],
+    report: &mut PointsReport,
+) -> Joined {
+    let count = snapped.len();
+    report.joined_rows = points.len() - count;
+    let mut places = vec![DVec3::INFINITY; count];
+    let less = |p: DVec3, q: DVec3| {
+        p.to_array().partial_cmp(&q.to_array()).is_some_and(|order| order.is_lt())
+    };
+    for (place, p) in snapped.place_of.iter().zip(points) {
+        let p = DVec3::from(*p);
+        // Within a rounding of the integers, rows may differ: their order shall not matter.
+        if less(p, places[*place as usize]) {
+            places[*place as usize] = p;
+        }
+    }
+    let mut differs = vec![false; points.len()];
+    let mut arrays = Vec::with_capacity(values.len());
+    for (name, of_rows) in values {
+        let mut sums = vec![(0.0, 0u32); count];
+        let mut first = vec![f64::NAN; count];
+        for (row, (place, value)) in snapped.place_of.iter().zip(of_rows).enumerate() {
+            let place = *place as usize;
+            if value.is_nan() {
+                report.missing_values += 1;
+                continue;
+            }
+            differs[row] |= sums[place].1 > 0 && first[place] != *value;
+            first[place] = *value;
+            sums[place] = (sums[place].0 + value, sums[place].1 + 1);
+        }
+        // A single value stays as it is; without any, the mean is NaN.
+        arrays.push(array(name, sums.iter().map(|(sum, n)| sum / f64::from(*n)).collect()));
+    }
+    report.joined_with_other_values = differs.iter().filter(|d| **d).count();
+    Joined { places, arrays }
+}
+
+/// The cells that are no gaps.
+fn kept<const N: usize>(
+    places: &[DVec3],
+    cells: &[[u32; N]],
+    gap: f64,
+    report: &mut PointsReport,
+) -> Cells {
+    let Gaps { is_gap, cells: gap_cells } = gaps::find(places, cells, gap);
+    report.gap_cells = gap_cells;
+    report.cells = cells.len() - gap_cells;
+    let kept = cells.iter().zip(is_gap).filter(|(_, gap)| !gap).flat_map(|(c, _)| *c);
+    Cells::uniform(N, kept.collect())
+}
+
+impl PointsReport {
+    /// What was found and done, one sentence each. `gap` is the option that made it.
+    pub(crate) fn sentences(&self, gap: f64) -> Vec<String> {
+        let (kind, place) = match self.dimensions {
+            2 => ("triangles", "in a plane"),
+            _ => ("tetrahedra", "in space"),
+        };
+        let mut found = vec![format!(
+            "{} points in no order {place} became {} {kind} by Delaunay triangulation; {} more, \
+             across places without points that are {gap} times as wide as the cells around, were \
+             taken away (the option gap)",
+            self.points, self.cells, self.gap_cells
+        )];
+        let mut add = |count: usize, what: &str| {
+            if count > 0 {
+                found.push(format!("{count} {what}"));
+            }
+        };
+        add(self.rows_without_place, "rows without a coordinate are left out");
+        add(self.joined_rows, "rows at the place of another one are joined with it");
+        add(
+            self.joined_with_other_values,
+            "of the joined rows have other values; their mean is taken",
+        );
+        add(self.missing_values, "values are missing and stay without a number (NaN)");
+        add(self.lonely_points, "points are in no cell: there are none near them");
+        found
+    }
+}

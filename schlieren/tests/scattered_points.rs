@@ -1,0 +1,121 @@
+//! Tables of points in no order, from the file to deflections: a bell of Gaussian, and the body in
+//! a plane.
+
+mod bells;
+mod common;
+
+use bells::{BLOB, options, tetrahedra};
+use common::grid;
+use datasets::model::{Dataset, UnstructuredGrid};
+use glam::DVec3;
+use rt_core::math::SplitMix64;
+use schlieren::input::{Depth, Medium, Options, Reference, contents, load, load_cells};
+use schlieren::march::{Medium as _, OnCells};
+use schlieren::path::{Exit, LightPaths, PathQuantities, Start};
+use schlieren::plan::{Plan, Request};
+use schlieren::view::{Axis, View};
+use std::f64::consts::TAU;
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+/// A table of these points with the bell's values, in an order by chance.
+fn table(folder: &tempfile::TempDir, mut points: Vec<DVec3>) -> PathBuf {
+    let mut random = SplitMix64::new(9);
+    for i in (1..points.len()).rev() {
+        points.swap(i, random.between(0.0, i as f64) as usize);
+    }
+    let mut text = String::from("X (m),Y (m),Z (m),eps\n");
+    for p in points {
+        writeln!(text, "{:?},{:?},{:?},{:?}", p.x, p.y, p.z, BLOB.sample(p).0).unwrap();
+    }
+    let path = folder.path().join("bell.csv");
+    std::fs::write(&path, text).unwrap();
+    path
+}
+
+/// The points of a lattice of 31 a side, moved by up to a third of their distance, the faces of the
+/// cube apart.
+fn moved() -> Vec<DVec3> {
+    let Dataset::UnstructuredGrid(UnstructuredGrid { points, .. }) = tetrahedra(31) else {
+        panic!("tetrahedra are an unstructured grid");
+    };
+    (0..points.len()).map(|i| points.get(i)).collect()
+}
+
+/// As many points by chance, and those on the faces.
+fn by_chance() -> Vec<DVec3> {
+    let mut random = SplitMix64::new(3);
+    let on_face = |p: &DVec3| p.abs().max_element() > 0.499;
+    let mut points: Vec<DVec3> = moved().into_iter().filter(on_face).collect();
+    while points.len() < 30_000 {
+        points.push(DVec3::from([(); 3].map(|()| random.between(-0.5, 0.5))));
+    }
+    points
+}
+
+/// Largest error by the largest deflection.
+fn error(starts: &[Start], exits: &[Exit], view: View) -> f64 {
+    let (mut worst, mut largest) = (0.0f64, 0.0f64);
+    for (start, exit) in starts.iter().zip(exits) {
+        let [x, y] = start.position_m.map(f64::from);
+        let at = view.right * x + view.up * y;
+        let truth = BLOB.deflection_rad(at.x, at.y, 0.5);
+        let truth = DVec3::new(truth[0], truth[1], 0.0);
+        let truth = [truth.dot(view.right), truth.dot(view.up)];
+        let error: [f64; 2] = [0, 1].map(|c| f64::from(exit.deflection_rad[c]) - truth[c]);
+        worst = worst.max(error[0].hypot(error[1]));
+        largest = largest.max(truth[0].hypot(truth[1]));
+    }
+    worst / largest
+}
+
+#[test]
+fn a_bell_at_scattered_points_gives_its_deflections() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, points, bounds) in
+        [("moved lattice", moved(), [2e-3, 2e-3]), ("by chance", by_chance(), [1e-2, 1e-2])]
+    {
+        let path = table(&folder, points);
+        let starts = grid(160, 0.96);
+        let mut exits = vec![Exit::UNDISTURBED; starts.len()];
+
+        let view = View::new(DVec3::Z, DVec3::Y, DVec3::ZERO).unwrap();
+        let field = load(&path, &options()).unwrap().field;
+        let request = Request { direction: Some(DVec3::Z), ..Request::default() };
+        Plan::new(&field, request).paths(&field, view).trace_parallel(&starts, &mut exits);
+        let on_lattice = error(&starts, &exits, view);
+
+        let view = View::along(Axis::Z, DVec3::ZERO);
+        let options = Options { reference: Reference::Given { n_minus_1: 0.0 }, ..options() };
+        let gas = load_cells(&path, &options).unwrap().0;
+        let quantities = PathQuantities { opd: true };
+        OnCells::new(&gas, view, quantities, 1).trace_parallel(&starts, &mut exits);
+        let on_cells = error(&starts, &exits, view);
+
+        println!("{name}: lattice {on_lattice:.2e}, cells {on_cells:.2e}");
+        assert!(on_lattice <= bounds[0] && on_cells <= bounds[1], "{name}");
+    }
+}
+
+#[test]
+fn the_body_in_a_plane_of_points_is_solid() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cylinder.csv");
+    let mut text = String::from("x-coordinate y-coordinate density\n");
+    for i in 0..120 * 30 {
+        let (angle, r) = (TAU * f64::from(i % 120) / 120.0, 0.01 * 1.08f64.powi(i / 120));
+        writeln!(text, "{} {} {}", r * angle.cos(), r * angle.sin(), 1.2 + r).unwrap();
+    }
+    std::fs::write(&path, text).unwrap();
+    let found = contents(&path, &Default::default()).unwrap();
+    assert!(found.planar && found.guess.is_some(), "{found:?}");
+    assert!(found.notes[0].starts_with("3600 points in no order in a plane"), "{found:?}");
+    let depth = Some(Depth::Span(0.1));
+    let options = Options { depth, ..Options::new(Medium::density("density")) };
+    let loaded = load(&path, &options).unwrap();
+    let bodies = loaded.report.outside.unwrap().bodies_percent.unwrap();
+    // The circle by the box around the outermost layer.
+    let outer = 1.08f64.powi(29);
+    let expected = 100.0 * TAU / 2.0 / (2.0 * outer).powi(2);
+    assert!((bodies / expected - 1.0).abs() < 0.1, "{bodies} % of {expected} %");
+}
