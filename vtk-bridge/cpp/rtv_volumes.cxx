@@ -128,6 +128,35 @@ void ReadMapper(vtkVolumeMapper* mapper, RtvVolumeFacts& facts)
   facts.vectors = (smart && smart->GetVectorMode() != off) || (blocks && blocks->GetVectorMode() != off) ? 1 : 0;
 }
 
+// The distance of the samples that OpenGL takes along a ray, in data units; 0 for mappers that take none in OpenGL.
+double SampleDistance(vtkVolumeMapper* mapper, vtkImageData* image, const uint32_t* dims, vtkMatrix4x4* matrix)
+{
+  const double* spacing = image->GetSpacing();
+  double least = 0.0, cells = 1.0;
+  for (int axis = 0; axis < 3; ++axis)
+  {
+    const double* row = matrix->Element[axis];
+    const double world = spacing[axis] * std::sqrt(row[0] * row[0] + row[1] * row[1] + row[2] * row[2]);
+    least = axis == 0 ? world : std::min(least, world);
+    cells *= dims[axis] - 1.0;
+  }
+  // Half of the mean spacing, and less in grids of fewer than a million cells.
+  const double mean = (spacing[0] + spacing[1] + spacing[2]) / 6.0;
+  const double locked = mean * (0.01 + 0.99 * std::min(1.0, std::pow(cells, 0.333) / 100.0));
+  // Adjusted distances are the smallest spacing in the world. While the user turns the scene OpenGL may take longer steps.
+  if (auto gpu = vtkGPUVolumeRayCastMapper::SafeDownCast(mapper))
+  {
+    const double own = gpu->GetSampleDistance();
+    const bool asGiven = !gpu->GetLockSampleDistanceToInputSpacing() || std::abs(own / locked - 1.0) <= 0.001;
+    return gpu->GetAutoAdjustSampleDistances() ? least : asGiven ? own : locked;
+  }
+  if (auto smart = vtkSmartVolumeMapper::SafeDownCast(mapper))
+  {
+    return !smart->GetInteractiveAdjustSampleDistances() && smart->GetAutoAdjustSampleDistances() ? least : locked;
+  }
+  return 0.0;
+}
+
 void ReadProperty(vtkVolumeProperty* property, RtvVolumeFacts& facts)
 {
   facts.transfer_function_2d = property->GetTransferFunctionMode() != vtkVolumeProperty::TF_1D ? 1 : 0;
@@ -254,6 +283,7 @@ const char* AddGrid(RtvBridge* bridge, vtkVolumeMapper* mapper, vtkVolume* volum
   v.colors = RtvArray{ colors.data(), Entries, 3, RTV_F32 };
   v.opacities = RtvArray{ opacities.data(), Entries, 1, RTV_F32 };
   v.unit_distance = property->GetScalarOpacityUnitDistance(0);
+  v.sample_distance = SampleDistance(mapper, image, v.dims, volume->GetMatrix());
   v.nearest = property->GetInterpolationType() == VTK_NEAREST_INTERPOLATION ? 1 : 0;
   if (v.blend == RTV_BLEND_ISOSURFACES)
   {

@@ -233,6 +233,8 @@ typedef struct RtvVolume {
   RtvArray opacities;
   /* See opacities. */
   double unit_distance;
+  /* Distance of the mapper's samples, data units, of which RTV_BLEND_COMPOSITE takes the same; 0 integrates instead. */
+  double sample_distance;
   /* 1 for shading by the gradient. */
   uint32_t shade;
   /* Of the shading. */
@@ -535,7 +537,7 @@ typedef struct RtvSceneFacts {
   uint64_t triangles;
 } RtvSceneFacts;
 /* Version of this interface, computed from its structures and calls (a test gives the value). A shim built for another version must not continue. */
-#define RTV_ABI 67577348u
+#define RTV_ABI 4009831552u
 /* All calls in one table, so that a shim needs only one symbol. */
 typedef struct RtvApi {
   /* rtv_abi. */

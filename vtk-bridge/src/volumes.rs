@@ -117,7 +117,7 @@ fn appearance_hash(v: &Input<'_>, lights: &[VolumeLight]) -> u64 {
     tables.for_each(|x| x.to_bits().hash(&mut h));
     format!("{:?}{:?}{:?}{:?}{:?}", v.nearest, v.range, v.unit_distance, v.shading, v.spacing)
         .hash(&mut h);
-    format!("{:?}{:?}{lights:?}", v.steepest, v.blend).hash(&mut h);
+    format!("{:?}{:?}{:?}{lights:?}", v.steepest, v.blend, v.sample_distance).hash(&mut h);
     h.finish()
 }
 
@@ -208,7 +208,11 @@ fn medium(v: &Input<'_>, grid: Arc<Grid>, lights: Vec<VolumeLight>) -> Result<Vo
     };
     // As in OpenGL's textures.
     let clamped_gradients = true;
+    if !(v.sample_distance >= 0.0 && v.sample_distance.is_finite()) {
+        return Err(format!("a volume whose sample distance is {}", v.sample_distance));
+    }
     let options = VolumeOptions {
+        sample_distance: (v.sample_distance > 0.0).then_some(v.sample_distance),
         shading,
         interpolation,
         blend,

@@ -73,3 +73,43 @@ fn value(volume: &Volume, p: DVec3) -> f64 {
         })
         .sum()
 }
+
+/// [`VolumeOptions::sample_distance`](super::VolumeOptions::sample_distance) in f64, sample by
+/// sample, without shading.
+#[cfg(test)]
+pub(super) fn samples_reference(volume: &Volume, ray: &Ray, t1: f64) -> [f64; 4] {
+    let grid = volume.grid();
+    let distance = volume.options().sample_distance.expect("a volume with samples");
+    let (o, d) = (ray.origin.as_dvec3(), ray.dir.as_dvec3());
+    let extent = grid.spacing * (grid.dims - UVec3::ONE).as_dvec3();
+    let (near, far) = super::within(o, d, extent);
+    let (near, step) = (near.max(0.0), distance / d.length());
+    let transfer = volume.transfer_function();
+    let [low, high] = transfer.range();
+    let entries = 1024.0;
+    let entry = |i: f64| {
+        let (sigma, color) = transfer.sample(low + (high - low) * i / (entries - 1.0));
+        (-(-sigma * distance).exp_m1(), color)
+    };
+    let (mut rgba, mut through) = ([0.0; 4], 1.0);
+    for k in 1.. {
+        let t = near + f64::from(k) * step;
+        if near >= far || (t > far && k > 1) || t - step >= t1 || through < 1.0 / 255.0 {
+            break;
+        }
+        let s = value(volume, (o + d * t) / grid.spacing);
+        if !s.is_finite() {
+            continue;
+        }
+        let place = ((s - low) / (high - low) * entries - 0.5).clamp(0.0, entries - 1.0);
+        let (i, f) = (place.floor(), place.fract());
+        let ((a0, c0), (a1, c1)) = (entry(i), entry((i + 1.0).min(entries - 1.0)));
+        let alpha = a0 + (a1 - a0) * f;
+        for c in 0..3 {
+            rgba[c] += through * alpha * (c0[c] + (c1[c] - c0[c]) * f);
+        }
+        through *= 1.0 - alpha;
+    }
+    rgba[3] = 1.0 - through;
+    rgba
+}

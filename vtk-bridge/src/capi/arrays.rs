@@ -215,6 +215,7 @@ pub(super) unsafe fn volume<'a>(v: &RtvVolume, name: &'a str) -> Result<Volume<'
             colors: tuples(&v.colors, "colours", RTV_F32)?,
             opacities: opacities.as_flattened(),
             unit_distance: v.unit_distance,
+            sample_distance: v.sample_distance,
             shading: (v.shade != 0).then_some(Shading {
                 ambient: v.ambient,
                 diffuse: v.diffuse,

@@ -252,6 +252,9 @@ pub struct RtvVolume {
     pub opacities: RtvArray,
     /// See opacities.
     pub unit_distance: f64,
+    /// Distance of the mapper's samples, data units, of which RTV_BLEND_COMPOSITE takes the same;
+    /// 0 integrates instead.
+    pub sample_distance: f64,
     /// 1 for shading by the gradient.
     pub shade: u32,
     /// Of the shading.
