@@ -179,7 +179,7 @@ impl TransferFunction {
         for point in [self.extinction.first(), self.extinction.last()].into_iter().flatten() {
             (low, high) = (low.min(point[0].into()), high.max(point[0].into()));
         }
-        (high > low).then_some([low, high]).unwrap_or([low, (low as f32).next_up().into()])
+        if high > low { [low, high] } else { [low, (low as f32).next_up().into()] }
     }
 
     /// Colour and extinction as linear pieces: exact, or with fewer knots and an error of at most a

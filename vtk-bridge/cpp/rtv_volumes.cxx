@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <vector>
+#include <vtkCamera.h>
 #include <vtkColorTransferFunction.h>
 #include <vtkCompositeDataIterator.h>
 #include <vtkCompositeDataSet.h>
@@ -167,8 +168,8 @@ void ReadProperty(vtkVolumeProperty* property, RtvVolumeFacts& facts)
   facts.specular = property->GetSpecular(0);
 }
 
-const char* AddGrid(RtvBridge* bridge, vtkVolumeMapper* mapper, vtkVolume* volume, vtkImageData* image, const Lights& lights,
-  const std::string& name, RtvVolumeFacts& facts)
+const char* AddGrid(RtvBridge* bridge, vtkVolumeMapper* mapper, vtkVolume* volume, vtkImageData* image, vtkCamera* camera,
+  const Lights& lights, const std::string& name, RtvVolumeFacts& facts)
 {
   vtkVolumeProperty* property = volume->GetProperty();
   RtvVolume v = {};
@@ -308,6 +309,12 @@ const char* AddGrid(RtvBridge* bridge, vtkVolumeMapper* mapper, vtkVolume* volum
     v.steepest = steepest / (spacing * reach);
   }
   v.shade = property->GetShade(0) ? 1 : 0;
+  if (camera->GetParallelProjection())
+  {
+    // OpenGL's light at the viewer shines from the camera's position then, too.
+    v.has_viewer = 1;
+    camera->GetPosition(v.viewer);
+  }
   v.lights = RtvArray{ lights.List.data(), lights.List.size() / 6, 6, RTV_F32 };
   v.ambient = lights.Several ? 0.0f : static_cast<float>(property->GetAmbient(0));
   v.diffuse = static_cast<float>(property->GetDiffuse(0));
@@ -358,5 +365,5 @@ const char* rtvAddVolume(RtvBridge* bridge, vtkVolume* volume, vtkRenderer* rend
     }
   }
   facts.has_data = 1;
-  return image ? AddGrid(bridge, mapper, volume, image, lights, name, facts) : rtvApi->check_volume(bridge, &facts);
+  return image ? AddGrid(bridge, mapper, volume, image, renderer->GetActiveCamera(), lights, name, facts) : rtvApi->check_volume(bridge, &facts);
 }

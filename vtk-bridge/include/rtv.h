@@ -235,6 +235,8 @@ typedef struct RtvVolume {
   double unit_distance;
   /* Distance of the mapper's samples, data units, of which RTV_BLEND_COMPOSITE takes the same; 0 integrates instead. */
   double sample_distance;
+  /* World position of the camera, with has_viewer. */
+  double viewer[3];
   /* 1 for shading by the gradient. */
   uint32_t shade;
   /* Of the shading. */
@@ -255,8 +257,8 @@ typedef struct RtvVolume {
   double steepest;
   /* One of RTV_BLEND_*. */
   uint32_t blend;
-  /* Not used. */
-  uint32_t reserved;
+  /* 1: lights at the viewer and highlights go by lines from viewer, not by the rays, which in parallel projections differ. */
+  uint32_t has_viewer;
   /* Scalars of the surfaces of RTV_BLEND_ISOSURFACES, f64. */
   RtvArray isovalues;
 } RtvVolume;

@@ -224,6 +224,14 @@ impl Volume {
         self.find_occupied();
     }
 
+    /// Sets [`VolumeOptions::viewer`], which costs no look at the grid.
+    pub fn set_viewer(&mut self, viewer: Option<DVec3>) -> Result<(), VolumeError> {
+        let options = VolumeOptions { viewer, ..self.options.clone() };
+        options.check((self.grid.max_corner() - self.grid.origin).length())?;
+        self.options = options;
+        Ok(())
+    }
+
     /// The same volume, integrated with no more than the instruction set `level`; `None` for the
     /// machine's best. Results have the same bits with all of them.
     pub fn with_simd_level(mut self, level: Option<SimdLevel>) -> Result<Self, UnavailableLevel> {

@@ -1,7 +1,7 @@
 //! Appearance of a volume: shading, blending, and the checks of both.
 
 use crate::grid::GridError;
-use glam::{UVec3, Vec3};
+use glam::{DVec3, UVec3, Vec3};
 use std::sync::Arc;
 
 /// Why a volume cannot be made.
@@ -192,6 +192,11 @@ pub struct VolumeOptions {
     /// ([`super::Volume::part`], [`super::RaySegments`]) and grids of 2³¹ points or more are
     /// integrated in any case.
     pub sample_distance: Option<f64>,
+    /// Where the viewer is, world units from the grid's origin in the volume's axes: lights at the
+    /// viewer and highlights go by the line from there to the point where a ray enters the grid.
+    /// VTK's GPU mapper does so in parallel projections too, where that is not the ray. `None` goes
+    /// by the ray.
+    pub viewer: Option<DVec3>,
 }
 
 impl VolumeOptions {
@@ -204,6 +209,9 @@ impl VolumeOptions {
             }
         }
         let fault = |field, value, rule| Err(VolumeError::Shading { field, value, rule });
+        if let Some(viewer) = self.viewer.filter(|v| !v.is_finite()) {
+            return fault("viewer", viewer.element_sum() as f32, "a finite position");
+        }
         const DIRECTION: &str = "a direction: finite and not zero";
         if let Some(s) = &self.shading {
             let fields = [("ambient", s.ambient), ("diffuse", s.diffuse)];

@@ -87,7 +87,6 @@ impl PacketLights {
         // NaN is not steep either.
         let steep = steepness.simd_gt(zero) & steepness.simd_lt(s(f32::INFINITY));
         let normal = g.scale(one / steep.select(steepness, one));
-        let towards = |d: Option<Vec3>| d.map_or(view, |d| Vec3x16::splat(simd, d));
         let weight = if self.half_gradient > 0.0 {
             steepness / (steepness + s(self.half_gradient))
         } else {
@@ -96,7 +95,7 @@ impl PacketLights {
         let flat = s(if self.half_gradient > 0.0 { 1.0 } else { self.ambient });
         let mut sums = [zero; 3];
         for (direction, light) in &self.lights {
-            let cos = normal.dot(towards(*direction)).abs();
+            let cos = normal.dot(towards(simd, *direction, view)).abs();
             for (sum, c) in sums.iter_mut().zip(light) {
                 *sum += cos * s(*c);
             }
@@ -111,7 +110,7 @@ impl PacketLights {
             // A light at the viewer shines along the ray; both signs of the gradient are
             // equivalent.
             let viewer = if light.is_some() { view.neg() } else { view };
-            let light = towards(*light);
+            let light = towards(simd, *light, view);
             let base = match form {
                 VolumeHighlight::Halfway => {
                     let (halfway, is_one) = light.add(viewer).try_normalize(simd);
@@ -148,6 +147,15 @@ impl<'a> GradientFactors<'a> {
         let entry = place.floor().min(s(self.last - 1.0));
         let [a, b] = self.factors.pairs(simd, entry.to_int());
         a + (b - a) * (place - entry)
+    }
+}
+
+/// The direction to a light; one at the viewer is along the view.
+#[inline(always)]
+fn towards<S: Simd>(simd: S, direction: Option<Vec3>, view: Vec3x16<S>) -> Vec3x16<S> {
+    match direction {
+        Some(direction) => Vec3x16::splat(simd, direction),
+        None => view,
     }
 }
 

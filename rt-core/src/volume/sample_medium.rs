@@ -62,60 +62,79 @@ pub(super) struct Cells<S: Simd> {
     pub(super) inside: [f32x16<S>; 3],
 }
 
-/// Linear interpolation; with the nearest value, one of the two, which keeps NaN out.
+/// Linear interpolation.
 #[inline(always)]
-pub(super) fn mix<S: Simd, const NEAREST: bool>(
-    simd: S,
-    a: f32x16<S>,
-    b: f32x16<S>,
-    at: f32x16<S>,
-) -> f32x16<S> {
-    if NEAREST { at.simd_gt(f32x16::splat(simd, 0.5)).select(b, a) } else { a + (b - a) * at }
+pub(super) fn mix<S: Simd>(a: f32x16<S>, b: f32x16<S>, at: f32x16<S>) -> f32x16<S> {
+    a + (b - a) * at
 }
 
 impl Medium<'_> {
-    /// The cells that contain these places, which are clamped to the grid.
+    /// The cells that contain these places, which are clamped to the grid. With nearest values a
+    /// place is that of the nearest point, in a corner of its cell.
     #[inline(always)]
-    pub(super) fn cells<S: Simd, const NEAREST: bool>(
-        &self,
-        simd: S,
-        place: Vec3x16<S>,
-    ) -> Cells<S> {
-        let s = |x: f32| f32x16::splat(simd, x);
-        let axis = |p: f32x16<S>, points: u32| {
-            let p = p.max(s(0.0)).min(s((points - 1) as f32));
-            // The point nearest to it, or the cell's lowest one.
-            let p = if NEAREST { (p + s(0.5)).floor().min(s((points - 1) as f32)) } else { p };
-            let low = p.floor().min(s((points - 2) as f32));
-            (low, p - low)
-        };
-        let (x, fx) = axis(place.x, self.dims.x);
-        let (y, fy) = axis(place.y, self.dims.y);
-        let (z, fz) = axis(place.z, self.dims.z);
-        let whole = |v: f32x16<S>| v.to_int::<i32x16<S>>();
-        let (nx, ny) = (self.dims.x as i32, self.dims.y as i32);
-        let row = whole(z) * i32x16::splat(simd, ny) + whole(y);
-        let index = row * i32x16::splat(simd, nx) + whole(x);
+    pub(super) fn cells<S: Simd>(&self, simd: S, place: Vec3x16<S>) -> Cells<S> {
+        let (x, fx) = self.along_axis(simd, place.x, self.dims.x);
+        let (y, fy) = self.along_axis(simd, place.y, self.dims.y);
+        let (z, fz) = self.along_axis(simd, place.z, self.dims.z);
+        let index = self.index(simd, [x, y, z]);
         Cells { index, low: [x, y, z], inside: [fx, fy, fz] }
     }
 
+    /// The lower of two neighbouring points, and the way to the other one.
     #[inline(always)]
-    pub(super) fn scalar<S: Simd, const NEAREST: bool>(
+    fn along_axis<S: Simd>(
         &self,
         simd: S,
-        cells: &Cells<S>,
-    ) -> f32x16<S> {
+        place: f32x16<S>,
+        points: u32,
+    ) -> (f32x16<S>, f32x16<S>) {
+        let s = |x: f32| f32x16::splat(simd, x);
+        let last = s((points - 1) as f32);
+        let place = place.max(s(0.0)).min(last);
+        let place = if self.nearest { (place + s(0.5)).floor().min(last) } else { place };
+        let low = place.floor().min(s((points - 2) as f32));
+        (low, place - low)
+    }
+
+    /// Indices of the points at these whole numbers.
+    #[inline(always)]
+    fn index<S: Simd>(&self, simd: S, [x, y, z]: [f32x16<S>; 3]) -> i32x16<S> {
+        let whole = |v: f32x16<S>| v.to_int::<i32x16<S>>();
+        let (nx, ny) = (self.dims.x as i32, self.dims.y as i32);
+        let row = whole(z) * i32x16::splat(simd, ny) + whole(y);
+        row * i32x16::splat(simd, nx) + whole(x)
+    }
+
+    #[inline(always)]
+    pub(super) fn scalar<S: Simd>(&self, simd: S, cells: &Cells<S>) -> f32x16<S> {
+        let [fx, fy, fz] = cells.inside;
+        if self.nearest {
+            // Not interpolated, which keeps the neighbours' NaN out.
+            let [x, y, z] = cells.low;
+            return self.point(simd, [x + fx, y + fy, z + fz]);
+        }
         let row = i32x16::splat(simd, self.dims.x as i32);
         let slab = i32x16::splat(simd, (self.dims.x * self.dims.y) as i32);
-        let [fx, fy, fz] = cells.inside;
-        let line = |index: i32x16<S>| {
-            let [a, b] = self.values.pairs(simd, index);
-            mix::<S, NEAREST>(simd, a, b, fx)
-        };
         let (near, far) = (cells.index, cells.index + slab);
-        let near = mix::<S, NEAREST>(simd, line(near), line(near + row), fy);
-        let far = mix::<S, NEAREST>(simd, line(far), line(far + row), fy);
-        mix::<S, NEAREST>(simd, near, far, fz)
+        let (a, b) = (self.along_x(simd, near, fx), self.along_x(simd, near + row, fx));
+        let (c, d) = (self.along_x(simd, far, fx), self.along_x(simd, far + row, fx));
+        mix(mix(a, b, fy), mix(c, d, fy), fz)
+    }
+
+    /// Values between the points of these indices and their neighbours along x.
+    #[inline(always)]
+    pub(super) fn along_x<S: Simd>(&self, simd: S, index: i32x16<S>, at: f32x16<S>) -> f32x16<S> {
+        let [a, b] = self.values.pairs(simd, index);
+        mix(a, b, at)
+    }
+
+    /// Values of the points at these whole numbers.
+    #[inline(always)]
+    pub(super) fn point<S: Simd>(&self, simd: S, [x, y, z]: [f32x16<S>; 3]) -> f32x16<S> {
+        // The last point is the second of the last pair.
+        let low = x.min(f32x16::splat(simd, (self.dims.x - 2) as f32));
+        let [a, b] = self.values.pairs(simd, self.index(simd, [low, y, z]));
+        x.simd_gt(low).select(b, a)
     }
 
     /// Entries of the table before these scalars, and the way to the next one. The first and the

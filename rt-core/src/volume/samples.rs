@@ -8,12 +8,11 @@
 use super::empty_space::distances;
 use super::sample_light::{GradientFactors, PacketLights};
 use super::sample_medium::{Gradients, Medium};
-use super::sample_packet::Packet;
+use super::sample_packet::{Packet, march};
 use super::sample_table::SampleTable;
 use super::{Blend, Volume, VolumeSample, within};
 use crate::ray::{LANES, Ray};
 use crate::simd::gather::GatherSlice;
-use fearless_simd::{Simd, dispatch};
 use glam::{DVec3, UVec3};
 
 /// What is known of a volume before any ray.
@@ -102,10 +101,7 @@ impl Volume {
         if !any {
             return;
         }
-        let found = dispatch!(self.level, simd => simd.vectorize(
-            #[inline(always)]
-            || medium.march(simd, &packet)
-        ));
+        let found = march(self.level, &medium, &packet);
         for (lane, out) in out[clear..].iter_mut().enumerate() {
             let [t0, step] = parameters[lane];
             let [r, g, b] = found.color.map(|row| row[lane]);
@@ -173,7 +169,7 @@ impl Volume {
         let at = |v: DVec3| (v / spacing).as_vec3();
         packet.origin.set(lane, at(o + d * near));
         packet.step.set(lane, at(d * step));
-        packet.direction.set(lane, (d / per_t).as_vec3());
+        packet.view.set(lane, self.view_along(o, d).normalize_or_zero().as_vec3());
         (packet.first[lane], packet.last[lane]) = (first as f32, last as f32);
         Some([near, step])
     }

@@ -1,6 +1,6 @@
 //! Gradients of a cell, and shading by lights.
 
-use super::{GradientOpacity, Volume, VolumeHighlight, VolumeShading};
+use super::{GradientOpacity, Volume, VolumeHighlight, VolumeShading, within};
 use crate::grid::Grid;
 use crate::grid_walk::IndexRay;
 use glam::{DVec3, UVec3, Vec3};
@@ -43,6 +43,24 @@ impl ShadingCurve<'_> {
 }
 
 impl Volume {
+    /// The direction in which lights at the viewer shine through the volume along a ray, which
+    /// starts at `o` in object space and goes along `d`. Not a unit vector.
+    pub(super) fn view_along(&self, o: DVec3, d: DVec3) -> DVec3 {
+        let Some(viewer) = self.options.viewer else { return d };
+        let extent = self.grid.spacing * (self.dims - UVec3::ONE).as_dvec3();
+        let (near, far) = within(o, d, extent);
+        let view = o + d * near.max(0.0) - viewer;
+        // A ray that misses the grid, or begins at the viewer.
+        if near < far && view.length_squared() > 0.0 { view } else { d }
+    }
+
+    /// [`Volume::view_along`] for a ray in cells.
+    pub(super) fn view_along_index(&self, ray: &IndexRay) -> DVec3 {
+        let [o, d] = [ray.o, ray.d].map(|v| DVec3::from_array(v) * self.grid.spacing);
+        // Boxes around points begin half a spacing before the grid.
+        self.view_along(if self.is_nearest() { o - 0.5 * self.grid.spacing } else { o }, d)
+    }
+
     /// Whether colours or extinctions depend on gradients.
     pub(super) fn has_light(&self) -> bool {
         self.options.shading.is_some() || self.options.gradient_opacity.is_some()
@@ -61,7 +79,7 @@ impl Volume {
         if !self.has_light() {
             return None;
         }
-        let dir = DVec3::from_array(ray.d) * self.grid.spacing;
+        let dir = self.view_along_index(ray);
         let ends = if self.is_nearest() {
             // The gradient at the point around which the box lies.
             [self.lit(

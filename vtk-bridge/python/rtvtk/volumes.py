@@ -129,9 +129,9 @@ class Volumes:
         image = _image_of(mapper, f)
         if image is None:
             require(bridge.check_volume, f)
-        self._add_grid(bridge, mapper, volume, image, lights, name, f)
+        self._add_grid(bridge, mapper, volume, image, renderer.GetActiveCamera(), lights, name, f)
 
-    def _add_grid(self, bridge, mapper, volume, image, lights, name, f):
+    def _add_grid(self, bridge, mapper, volume, image, camera, lights, name, f):
         p, v, keep = volume.GetProperty(), rtv.Volume(), []
         v.name = name.encode()
         extent = image.GetExtent()
@@ -173,6 +173,9 @@ class Volumes:
         v.unit_distance = p.GetScalarOpacityUnitDistance(0)
         v.sample_distance = _sample_distance(mapper, image, dims, volume.GetMatrix())
         v.nearest, v.shade = p.GetInterpolationType() == 0, bool(p.GetShade(0))
+        if camera.GetParallelProjection():
+            # OpenGL's light at the viewer shines from the camera's position then, too.
+            v.has_viewer, v.viewer[:] = 1, camera.GetPosition()
         if lights.rows:
             keep.append(np.array(lights.rows, np.float32))
             v.lights = rtv.Array.of(keep[-1])
