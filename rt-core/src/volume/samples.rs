@@ -194,13 +194,14 @@ mod tests {
     /// A level of 255, of which a tenth is what f32 and rounding may cost.
     const LEVEL: f64 = 1.0 / 255.0;
 
-    /// Waves between -1.3 and 1.3, times `scale`, where something is, and nothing elsewhere.
+    /// Waves between -1.3 and 1.3, times `scale`, where something is, and nothing elsewhere. Small
+    /// grids are not empty.
     fn grid(dims: UVec3, spacing: DVec3, scale: f32) -> Grid {
         let count = dims.as_usizevec3().element_product();
         let values = (0..count as u32).map(|i| {
             let p = UVec3::new(i % dims.x, i / dims.x % dims.y, i / dims.x / dims.y).as_vec3();
             let wave = (0.6 * p.x).sin() * (0.5 * p.y).cos() + 0.3 * (0.8 * p.z).sin();
-            scale * if (p.x - 20.0).abs() < 9.0 { wave } else { -1.3 }
+            scale * if dims.x < 11 || (p.x - 20.0).abs() < 9.0 { wave } else { -1.3 }
         });
         Grid::new(dims, DVec3::new(5.0, -3.0, 2.0), spacing, values.collect()).expect("a grid")
     }
@@ -277,20 +278,17 @@ mod tests {
     #[test]
     fn samples_agree_with_the_reference_at_every_size_spacing_and_range() {
         for (dims, spacing, scale, distance) in cases() {
-            let plain = VolumeOptions { sample_distance: Some(distance), ..Default::default() };
-            let v = volume(dims, spacing, scale, plain);
-            let size = (spacing * (dims - 1).as_dvec3()).as_vec3();
-            for (ray, _) in rays(300, size, 7) {
-                for end in [f32::INFINITY, 9.9] {
+            for options in options() {
+                let options = VolumeOptions { sample_distance: Some(distance), ..options };
+                let v = volume(dims, spacing, scale, options.clone());
+                let size = (spacing * (dims - 1).as_dvec3()).as_vec3();
+                let rays = rays(300, size, 7).into_iter().filter(|(ray, _)| ray.is_valid());
+                for (ray, end) in rays.flat_map(|(r, _)| [(r, f32::INFINITY), (r, 9.9)]) {
                     let got = v.integrate(&ray, 0.0, end, &VolumeQuality::default());
-                    let wanted = if ray.is_valid() {
-                        samples_reference(&v, &ray, end.into())
-                    } else {
-                        [0.0; 4]
-                    };
+                    let wanted = samples_reference(&v, &ray, end.into());
                     for c in 0..4 {
                         let off = (f64::from(got.rgba[c]) - wanted[c]).abs();
-                        assert!(off < 0.1 * LEVEL, "{dims} {got:?} {wanted:?} {ray:?}");
+                        assert!(off < 0.1 * LEVEL, "{dims} {got:?} {wanted:?} {ray:?} {options:?}");
                     }
                 }
             }
@@ -303,6 +301,9 @@ mod tests {
         let plain = VolumeOptions { sample_distance: Some(0.01), ..Default::default() };
         let v = volume(dims, DVec3::ONE, 1.0, plain);
         for (ray, _) in rays(60, (dims - 1).as_vec3(), 3) {
+            if !ray.is_valid() {
+                continue;
+            }
             let got = v.integrate(&ray, 0.0, f32::INFINITY, &VolumeQuality::default());
             let wanted = integrate_reference(&v, &ray, 0.0, f32::INFINITY, 0.01);
             for c in 0..4 {
@@ -323,7 +324,7 @@ mod tests {
                 let v = volume(dims, spacing, scale, options);
                 let rays = rays(70, (spacing * (dims - 1).as_dvec3()).as_vec3(), 11);
                 let alone: Vec<_> = rays.iter().map(|(r, s)| v.sample_ray(r, s[0], s[1])).collect();
-                assert!(dims == UVec3::new(33, 2, 9) || alone.iter().any(|s| s.samples > 0));
+                assert!(alone.iter().any(|s| s.samples > 0), "{dims}");
                 for level in SimdLevel::available() {
                     let v = v.clone().with_simd_level(Some(level)).expect("available");
                     let mut packets = Vec::new();
@@ -365,33 +366,6 @@ mod tests {
             for c in 0..4 {
                 let both = near.rgba[c] + (1.0 - near.rgba[3]) * far.rgba[c];
                 assert!((both - whole.rgba[c]).abs() < 1e-5, "{near:?} {far:?} {whole:?}");
-            }
-        }
-    }
-
-    #[test]
-    fn gradients_in_lanes_are_those_of_one_cell() {
-        // With samples and tolerances fine enough, light is that of the integral.
-        for options in options() {
-            if options.interpolation == Interpolation::Nearest {
-                continue;
-            }
-            let dims = UVec3::new(41, 23, 18);
-            let fine = VolumeOptions { sample_distance: Some(0.01), ..options.clone() };
-            let v = volume(dims, DVec3::new(1.0, 1.2, 0.8), 1.0, fine);
-            let exact = VolumeOptions { sample_distance: None, ..options.clone() };
-            let exact = volume(dims, DVec3::new(1.0, 1.2, 0.8), 1.0, exact);
-            let quality = VolumeQuality::Tolerance { levels: 0.05 };
-            for (ray, _) in rays(40, Vec3::new(40.0, 26.0, 13.0), 17) {
-                let got = v.integrate(&ray, 0.0, f32::INFINITY, &quality);
-                let wanted = exact.integrate(&ray, 0.0, f32::INFINITY, &quality);
-                if wanted.rgba.iter().any(|c| *c >= 0.999) {
-                    continue;
-                }
-                for c in 0..4 {
-                    let off = f64::from((got.rgba[c] - wanted.rgba[c]).abs());
-                    assert!(off < 2.0 * LEVEL, "{got:?} {wanted:?} {options:?}");
-                }
             }
         }
     }
