@@ -129,7 +129,8 @@ void ReadMapper(vtkVolumeMapper* mapper, RtvVolumeFacts& facts)
   facts.vectors = (smart && smart->GetVectorMode() != off) || (blocks && blocks->GetVectorMode() != off) ? 1 : 0;
 }
 
-// The distance of the samples that OpenGL takes along a ray, in data units; 0 for mappers that take none in OpenGL.
+// The distance of the samples that OpenGL takes along a ray, in data units; 0 for mappers that take none in OpenGL, or that
+// move them by noise, whose mean is the integral.
 double SampleDistance(vtkVolumeMapper* mapper, vtkImageData* image, const uint32_t* dims, vtkMatrix4x4* matrix)
 {
   const double* spacing = image->GetSpacing();
@@ -147,12 +148,22 @@ double SampleDistance(vtkVolumeMapper* mapper, vtkImageData* image, const uint32
   // Adjusted distances are the smallest spacing in the world. While the user turns the scene OpenGL may take longer steps.
   if (auto gpu = vtkGPUVolumeRayCastMapper::SafeDownCast(mapper))
   {
+    if (gpu->GetUseJittering())
+    {
+      return 0.0;
+    }
     const double own = gpu->GetSampleDistance();
     const bool asGiven = !gpu->GetLockSampleDistanceToInputSpacing() || std::abs(own / locked - 1.0) <= 0.001;
     return gpu->GetAutoAdjustSampleDistances() ? least : asGiven ? own : locked;
   }
   if (auto smart = vtkSmartVolumeMapper::SafeDownCast(mapper))
   {
+#if VTK_VERSION_NUMBER >= VTK_VERSION_CHECK(9, 2, 0)
+    if (smart->GetUseJittering())
+    {
+      return 0.0;
+    }
+#endif
     return !smart->GetInteractiveAdjustSampleDistances() && smart->GetAutoAdjustSampleDistances() ? least : locked;
   }
   return 0.0;

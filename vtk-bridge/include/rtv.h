@@ -539,7 +539,7 @@ typedef struct RtvSceneFacts {
   uint64_t triangles;
 } RtvSceneFacts;
 /* Version of this interface, computed from its structures and calls (a test gives the value). A shim built for another version must not continue. */
-#define RTV_ABI 4009831552u
+#define RTV_ABI 2667571646u
 /* All calls in one table, so that a shim needs only one symbol. */
 typedef struct RtvApi {
   /* rtv_abi. */

@@ -4,7 +4,7 @@ import os
 
 import numpy as np
 
-ABI = 4009831552
+ABI = 2667571646
 #: The first VTK whose renderers Python can replace.
 OLDEST_VTK = (9, 4)
 NONE, U8, F32, F64, I32, I64 = range(6)

@@ -91,7 +91,10 @@ def _scalars_of(mapper, image, f):
 
 
 def _sample_distance(mapper, image, dims, matrix):
-    """The distance of the samples that OpenGL takes along a ray, in data units; 0 for mappers that take none in OpenGL."""
+    """The distance of the samples that OpenGL takes along a ray, in data units; 0 for mappers that take none in OpenGL, or that move
+    them by noise, whose mean is the integral."""
+    if any(mapper.IsA(kind) for kind in ("vtkGPUVolumeRayCastMapper", "vtkSmartVolumeMapper")) and mapper.GetUseJittering():
+        return 0
     spacing = image.GetSpacing()
     # Half of the mean spacing, and less in grids of fewer than a million cells.
     size = min(1, math.prod(n - 1 for n in dims) ** 0.333 / 100)
