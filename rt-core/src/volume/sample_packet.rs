@@ -66,8 +66,8 @@ impl Collected {
 
 /// Marches all rays to their ends.
 pub(super) fn march(level: Level, medium: &Medium<'_>, packet: &Packet) -> Collected {
-    // SSE4.2 takes SSE2's: processors between it and AVX2 are older than 2013, and each further
-    // instruction set is a tenth of what rt-core takes to compile.
+    // SSE4.2 takes SSE2's: processors between it and AVX2 are older than 2013, and a third of the
+    // code would be for them.
     #[cfg(target_arch = "x86_64")]
     let level = match level {
         Level::Sse4_2(_) => level.as_sse2().map_or(level, Level::Sse2),
@@ -178,7 +178,8 @@ impl Medium<'_> {
     }
 
     // Functions of their own, with the instruction set of the caller: inlined into the march, they
-    // took the compiler ten minutes.
+    // took the compiler ten minutes. What they call is inlined always, because a closure or a
+    // function that is not has no instruction set, and a call for each operation.
     #[inline(never)]
     fn gradient_apart<S: Simd>(
         &self,
