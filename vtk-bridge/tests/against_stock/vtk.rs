@@ -112,8 +112,6 @@ pub(crate) const EXCEPTIONS: &[Exception] = &[
     ("volume_lights", "kit_turned", None, LEFT_BEHIND),
     ("volume_lights", "turned", None, LEFT_BEHIND),
     ("volume_lights", "camera_turned", Some(SHADED), "as shaded volumes"),
-    ("volume_lights", "parallel", Some(SHADED), "as shaded volumes"),
-    ("volume_lights", "parallel_highlight", Some(SHADED), "as shaded volumes"),
     (
         "volumes",
         "translucent_inside",
