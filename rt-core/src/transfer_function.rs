@@ -170,6 +170,18 @@ impl TransferFunction {
         extinction_at(&self.extinction, scalar)
     }
 
+    /// The scalars between which colour or extinction change; never empty.
+    pub(crate) fn range(&self) -> [f64; 2] {
+        let [mut low, mut high] = self.colors.range.map(f64::from);
+        if low > high {
+            (low, high) = (high, low);
+        }
+        for point in [self.extinction.first(), self.extinction.last()].into_iter().flatten() {
+            (low, high) = (low.min(point[0].into()), high.max(point[0].into()));
+        }
+        if high > low { [low, high] } else { [low, (low as f32).next_up().into()] }
+    }
+
     /// Colour and extinction as linear pieces: exact, or with fewer knots and an error of at most a
     /// tenth of a level.
     pub(crate) fn pieces(&self, simplified: bool) -> &Pieces {

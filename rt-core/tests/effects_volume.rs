@@ -11,7 +11,7 @@ use rt_core::material::Material;
 use rt_core::render::{RenderError, RenderOptions, render};
 use rt_core::scene::SceneBuilder;
 use rt_core::transfer_function::TransferFunction;
-use rt_core::volume::{Volume, VolumeOptions};
+use rt_core::volume::{Volume, VolumeOptions, VolumeShading};
 use scenes_common::*;
 
 /// White fog in a box of 4 x 4 x `height`: half of the light passes one unit of length.
@@ -101,4 +101,47 @@ fn unsupported_and_partial_requests_are_named() {
     assert_eq!(o.frame.color_at(4, 4), [1.0; 4]);
     assert_eq!(o.report.rays.volume, 0);
     assert!(o.report.warnings.iter().any(|w| w.starts_with("volumes left out")));
+}
+
+/// Waves in a box of 4 x 4 x 2, lit from the viewer.
+fn lit_waves(sample_distance: Option<f64>) -> Volume {
+    let dims = UVec3::new(17, 17, 9);
+    let values = (0..dims.element_product()).map(|i| {
+        let [x, y, z] = [i % 17, i / 17 % 17, i / 289].map(|n| n as f32);
+        0.5 + 0.3 * (0.7 * x).sin() * (0.5 * y).cos() + 0.2 * (0.6 * z).sin()
+    });
+    let corner = DVec3::new(-2.0, -2.0, 0.0);
+    let grid = Grid::new(dims, corner, DVec3::splat(0.25), values.collect()).unwrap();
+    let colors = ColorMap::new(vec![[0.1, 0.3, 0.9, 1.0], [0.9, 0.4, 0.1, 1.0]], [0.0, 1.0]);
+    let transfer =
+        TransferFunction::from_opacity(colors, &[[0.0, 0.0], [0.4, 0.0], [1.0, 0.6]], 1.0);
+    let shading = Some(VolumeShading { ambient: 0.3, diffuse: 0.6, ..VolumeShading::default() });
+    let options = VolumeOptions { shading, sample_distance, ..VolumeOptions::default() };
+    Volume::new(grid.into(), transfer.unwrap(), options).unwrap()
+}
+
+/// Samples are taken for a wavefront at a time, and once more behind a translucent surface.
+#[test]
+fn samples_in_frames_converge_to_the_integral_with_any_number_of_threads() {
+    let image = |sample_distance, threads| {
+        let mut b = SceneBuilder::new();
+        let floor = floor(1.0, 1.5);
+        b.mesh(floor, Material::unlit([0.2, 0.9, 0.2]).with_opacity(0.5));
+        b.volume(lit_waves(sample_distance));
+        let scene = b.build().unwrap();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let frame = || draw(&scene, &top_camera(6.0, 2.0), RenderOptions::new(67, 45)).frame;
+        pool.install(frame).color
+    };
+    let integrated = image(None, 1);
+    let fine = image(Some(0.002), 2);
+    for (a, b) in integrated.iter().zip(&fine) {
+        for c in 0..4 {
+            // Half a level from the integral, one from the light that a ray leaves behind.
+            assert!((a[c] - b[c]).abs() < 1.7 / 255.0, "{a:?} {b:?}");
+        }
+    }
+    let coarse = image(Some(0.25), 1);
+    assert_eq!(coarse, image(Some(0.25), 3));
+    assert_ne!(coarse, integrated, "the distance is used");
 }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <vector>
+#include <vtkCamera.h>
 #include <vtkColorTransferFunction.h>
 #include <vtkCompositeDataIterator.h>
 #include <vtkCompositeDataSet.h>
@@ -128,6 +129,46 @@ void ReadMapper(vtkVolumeMapper* mapper, RtvVolumeFacts& facts)
   facts.vectors = (smart && smart->GetVectorMode() != off) || (blocks && blocks->GetVectorMode() != off) ? 1 : 0;
 }
 
+// The distance of the samples that OpenGL takes along a ray, in data units; 0 for mappers that take none in OpenGL, or that
+// move them by noise, whose mean is the integral.
+double SampleDistance(vtkVolumeMapper* mapper, vtkImageData* image, const uint32_t* dims, vtkMatrix4x4* matrix)
+{
+  const double* spacing = image->GetSpacing();
+  double least = 0.0, cells = 1.0;
+  for (int axis = 0; axis < 3; ++axis)
+  {
+    const double* row = matrix->Element[axis];
+    const double world = spacing[axis] * std::sqrt(row[0] * row[0] + row[1] * row[1] + row[2] * row[2]);
+    least = axis == 0 ? world : std::min(least, world);
+    cells *= dims[axis] - 1.0;
+  }
+  // Half of the mean spacing, and less in grids of fewer than a million cells.
+  const double mean = (spacing[0] + spacing[1] + spacing[2]) / 6.0;
+  const double locked = mean * (0.01 + 0.99 * std::min(1.0, std::pow(cells, 0.333) / 100.0));
+  // Adjusted distances are the smallest spacing in the world. While the user turns the scene OpenGL may take longer steps.
+  if (auto gpu = vtkGPUVolumeRayCastMapper::SafeDownCast(mapper))
+  {
+    if (gpu->GetUseJittering())
+    {
+      return 0.0;
+    }
+    const double own = gpu->GetSampleDistance();
+    const bool asGiven = !gpu->GetLockSampleDistanceToInputSpacing() || std::abs(own / locked - 1.0) <= 0.001;
+    return gpu->GetAutoAdjustSampleDistances() ? least : asGiven ? own : locked;
+  }
+  if (auto smart = vtkSmartVolumeMapper::SafeDownCast(mapper))
+  {
+#if VTK_VERSION_NUMBER >= VTK_VERSION_CHECK(9, 2, 0)
+    if (smart->GetUseJittering())
+    {
+      return 0.0;
+    }
+#endif
+    return !smart->GetInteractiveAdjustSampleDistances() && smart->GetAutoAdjustSampleDistances() ? least : locked;
+  }
+  return 0.0;
+}
+
 void ReadProperty(vtkVolumeProperty* property, RtvVolumeFacts& facts)
 {
   facts.transfer_function_2d = property->GetTransferFunctionMode() != vtkVolumeProperty::TF_1D ? 1 : 0;
@@ -138,8 +179,8 @@ void ReadProperty(vtkVolumeProperty* property, RtvVolumeFacts& facts)
   facts.specular = property->GetSpecular(0);
 }
 
-const char* AddGrid(RtvBridge* bridge, vtkVolumeMapper* mapper, vtkVolume* volume, vtkImageData* image, const Lights& lights,
-  const std::string& name, RtvVolumeFacts& facts)
+const char* AddGrid(RtvBridge* bridge, vtkVolumeMapper* mapper, vtkVolume* volume, vtkImageData* image, vtkCamera* camera,
+  const Lights& lights, const std::string& name, RtvVolumeFacts& facts)
 {
   vtkVolumeProperty* property = volume->GetProperty();
   RtvVolume v = {};
@@ -254,6 +295,7 @@ const char* AddGrid(RtvBridge* bridge, vtkVolumeMapper* mapper, vtkVolume* volum
   v.colors = RtvArray{ colors.data(), Entries, 3, RTV_F32 };
   v.opacities = RtvArray{ opacities.data(), Entries, 1, RTV_F32 };
   v.unit_distance = property->GetScalarOpacityUnitDistance(0);
+  v.sample_distance = SampleDistance(mapper, image, v.dims, volume->GetMatrix());
   v.nearest = property->GetInterpolationType() == VTK_NEAREST_INTERPOLATION ? 1 : 0;
   if (v.blend == RTV_BLEND_ISOSURFACES)
   {
@@ -278,6 +320,12 @@ const char* AddGrid(RtvBridge* bridge, vtkVolumeMapper* mapper, vtkVolume* volum
     v.steepest = steepest / (spacing * reach);
   }
   v.shade = property->GetShade(0) ? 1 : 0;
+  if (camera->GetParallelProjection())
+  {
+    // OpenGL's light at the viewer shines from the camera's position then, too.
+    v.has_viewer = 1;
+    camera->GetPosition(v.viewer);
+  }
   v.lights = RtvArray{ lights.List.data(), lights.List.size() / 6, 6, RTV_F32 };
   v.ambient = lights.Several ? 0.0f : static_cast<float>(property->GetAmbient(0));
   v.diffuse = static_cast<float>(property->GetDiffuse(0));
@@ -328,5 +376,5 @@ const char* rtvAddVolume(RtvBridge* bridge, vtkVolume* volume, vtkRenderer* rend
     }
   }
   facts.has_data = 1;
-  return image ? AddGrid(bridge, mapper, volume, image, lights, name, facts) : rtvApi->check_volume(bridge, &facts);
+  return image ? AddGrid(bridge, mapper, volume, image, renderer->GetActiveCamera(), lights, name, facts) : rtvApi->check_volume(bridge, &facts);
 }

@@ -233,6 +233,10 @@ typedef struct RtvVolume {
   RtvArray opacities;
   /* See opacities. */
   double unit_distance;
+  /* Distance of the mapper's samples, data units, of which RTV_BLEND_COMPOSITE takes the same; 0 integrates instead. */
+  double sample_distance;
+  /* World position of the camera, with has_viewer. */
+  double viewer[3];
   /* 1 for shading by the gradient. */
   uint32_t shade;
   /* Of the shading. */
@@ -253,8 +257,8 @@ typedef struct RtvVolume {
   double steepest;
   /* One of RTV_BLEND_*. */
   uint32_t blend;
-  /* Not used. */
-  uint32_t reserved;
+  /* 1: lights at the viewer and highlights go by lines from viewer, not by the rays, which in parallel projections differ. */
+  uint32_t has_viewer;
   /* Scalars of the surfaces of RTV_BLEND_ISOSURFACES, f64. */
   RtvArray isovalues;
 } RtvVolume;
@@ -535,7 +539,7 @@ typedef struct RtvSceneFacts {
   uint64_t triangles;
 } RtvSceneFacts;
 /* Version of this interface, computed from its structures and calls (a test gives the value). A shim built for another version must not continue. */
-#define RTV_ABI 67577348u
+#define RTV_ABI 2667571646u
 /* All calls in one table, so that a shim needs only one symbol. */
 typedef struct RtvApi {
   /* rtv_abi. */

@@ -383,6 +383,12 @@ pub struct Volume<'a> {
     pub opacities: &'a [f32],
     /// Thickness to which the opacities refer, data units.
     pub unit_distance: f64,
+    /// Distance of the mapper's samples along a ray, data units: [`VolumeBlend::Composite`] takes
+    /// the same ones. 0 integrates to half a level instead.
+    pub sample_distance: f64,
+    /// World position of the camera: lights at the viewer and highlights go by lines from it, as in
+    /// OpenGL's parallel projections. `None`: by the rays.
+    pub viewer: Option<DVec3>,
     /// Shading; `None` for none.
     pub shading: Option<Shading>,
     /// For each light, its world direction (zero for a light at the viewer) and its colour. An

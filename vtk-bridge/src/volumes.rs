@@ -69,18 +69,27 @@ impl VolumeCache {
         // Lights are stored in the volume's axes, so a rotated volume has a different appearance.
         let lights = lights(v, place)?;
         let appearance = appearance_hash(v, &lights);
+        let from_world = place.inverse();
+        let viewer = v.viewer.filter(|_| v.shading.is_some());
+        let viewer = viewer.map(|eye| from_world.transform_point3(eye));
         (v.key, appearance).hash(content);
+        format!("{viewer:?}").hash(content);
         format!("{place:?}").hash(content);
         let kept = self.kept.get_mut(&v.key).filter(|_| v.key != 0);
         let volume = match kept {
             Some(kept) if kept.appearance == appearance => {
                 kept.used = true;
+                if kept.volume.options().viewer != viewer {
+                    let mut moved = Volume::clone(&kept.volume);
+                    moved.set_viewer(viewer).map_err(|e| format!("a volume: {e}"))?;
+                    kept.volume = Arc::new(moved);
+                }
                 Arc::clone(&kept.volume)
             }
             Some(kept) => {
                 let grid = Arc::clone(kept.volume.grid());
                 *kept = CachedVolume {
-                    volume: Arc::new(medium(v, grid, lights)?),
+                    volume: Arc::new(medium(v, viewer, grid, lights)?),
                     appearance,
                     used: true,
                 };
@@ -92,7 +101,7 @@ impl VolumeCache {
                 let grid =
                     Grid::new(UVec3::from_array(v.dims), DVec3::ZERO, DVec3::new(x, y, z), values)
                         .map_err(|e| format!("a volume: {e}"))?;
-                let volume = Arc::new(medium(v, Arc::new(grid), lights)?);
+                let volume = Arc::new(medium(v, viewer, Arc::new(grid), lights)?);
                 self.kept.insert(
                     v.key,
                     CachedVolume { volume: Arc::clone(&volume), appearance, used: true },
@@ -110,14 +119,14 @@ impl VolumeCache {
     }
 }
 
-/// Hash of everything except the scalars and the transform.
+/// Hash of everything except the scalars, the transform and the viewer.
 fn appearance_hash(v: &Input<'_>, lights: &[VolumeLight]) -> u64 {
     let mut h = DefaultHasher::new();
     let tables = v.colors.iter().flatten().chain(v.opacities).chain(v.gradient_opacities);
     tables.for_each(|x| x.to_bits().hash(&mut h));
     format!("{:?}{:?}{:?}{:?}{:?}", v.nearest, v.range, v.unit_distance, v.shading, v.spacing)
         .hash(&mut h);
-    format!("{:?}{:?}{lights:?}", v.steepest, v.blend).hash(&mut h);
+    format!("{:?}{:?}{:?}{lights:?}", v.steepest, v.blend, v.sample_distance).hash(&mut h);
     h.finish()
 }
 
@@ -157,7 +166,12 @@ fn values(scalars: &Scalars<'_>) -> Vec<f32> {
     }
 }
 
-fn medium(v: &Input<'_>, grid: Arc<Grid>, lights: Vec<VolumeLight>) -> Result<Volume, String> {
+fn medium(
+    v: &Input<'_>,
+    viewer: Option<DVec3>,
+    grid: Arc<Grid>,
+    lights: Vec<VolumeLight>,
+) -> Result<Volume, String> {
     let finite = |x: f32| if x.is_finite() { x.max(0.0) } else { 0.0 };
     let [low, high] = v.range.map(|r| r as f32);
     let high = if high > low { high } else { low.next_up() };
@@ -208,13 +222,18 @@ fn medium(v: &Input<'_>, grid: Arc<Grid>, lights: Vec<VolumeLight>) -> Result<Vo
     };
     // As in OpenGL's textures.
     let clamped_gradients = true;
+    if !(v.sample_distance >= 0.0 && v.sample_distance.is_finite()) {
+        return Err(format!("a volume whose sample distance is {}", v.sample_distance));
+    }
     let options = VolumeOptions {
+        sample_distance: (v.sample_distance > 0.0).then_some(v.sample_distance),
         shading,
         interpolation,
         blend,
         lights,
         gradient_opacity,
         clamped_gradients,
+        viewer,
     };
     Volume::new(grid, transfer, options).map_err(|e| format!("a volume: {e}"))
 }

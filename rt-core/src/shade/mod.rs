@@ -95,6 +95,9 @@ pub(crate) struct Workspace {
     /// For each ray, what it collects in the volume up to its hit, where other processes hold the
     /// volume's bricks; empty where the whole volume is here.
     volume_samples: Vec<crate::volume::VolumeSample>,
+    /// The same where the frame's only volume takes samples, which it does for sixteen rays at a
+    /// time.
+    sampled: volumes::SampledRays,
     /// One ray in the object spaces of all volumes.
     object_rays: Vec<Ray>,
     /// Premultiplied RGBA of this sample.
@@ -308,6 +311,7 @@ fn process_hits_with<M: Maps>(
         || !context.volumes.is_empty();
     let mut surfaces = BlockSurfaces::new();
     let mut nothing = false;
+    work.sampled.take(context, &work.current, &work.hits, !work.volume_samples.is_empty());
     for i in 0..work.current.states.len() {
         let (block, hits, lane) =
             (&work.current.blocks[i / LANES], &work.hits[i / LANES], i % LANES);
@@ -327,8 +331,9 @@ fn process_hits_with<M: Maps>(
         let ray = block.get(lane);
         if !context.volumes.is_empty() {
             let t_end = hit.map_or(ray.t_max, |h| h.t);
-            let sample = match work.volume_samples.get(i) {
-                Some(collected_elsewhere) => *collected_elsewhere,
+            let collected = work.volume_samples.get(i).or_else(|| work.sampled.get(i));
+            let sample = match collected {
+                Some(collected) => *collected,
                 None => volumes::integrate_volumes(context, &ray, t_end, &mut work.object_rays),
             };
             volumes::composite_volume(

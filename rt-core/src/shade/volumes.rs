@@ -1,8 +1,8 @@
 //! Media between a ray's origin and the surface that it hits.
 
 use super::frame_context::FrameContext;
-use super::wavefront::RayState;
-use crate::ray::Ray;
+use super::wavefront::{RayState, Wavefront};
+use crate::ray::{HitBlock, LANES, Ray};
 use crate::ray_stats::RayStats;
 use crate::volume::{VolumeSample, integrate_overlapping};
 use glam::DAffine3;
@@ -39,6 +39,43 @@ pub(super) fn integrate_volumes(
         let pairs: Vec<_> =
             context.volumes.iter().zip(object_rays.iter()).map(|((v, _), r)| (*v, *r)).collect();
         integrate_overlapping(&pairs, ray.t_min, t_end, quality)
+    }
+}
+
+/// What the rays of a wavefront collect in a volume that takes samples.
+#[derive(Default)]
+pub(super) struct SampledRays {
+    rays: Vec<(Ray, [f32; 2])>,
+    found: Vec<VolumeSample>,
+}
+
+impl SampledRays {
+    /// Computes them up to the rays' hits. Nothing where the frame has another volume too, where
+    /// the volume is integrated, or where others have sent what rays collect (`is_known`).
+    pub(super) fn take(
+        &mut self,
+        context: &FrameContext<'_>,
+        front: &Wavefront,
+        hits: &[HitBlock],
+        is_known: bool,
+    ) {
+        self.found.clear();
+        let [(volume, object_from_render)] = &context.volumes[..] else { return };
+        if is_known || !volume.takes_samples() {
+            return;
+        }
+        self.rays.clear();
+        for i in 0..front.states.len() {
+            let ray = front.blocks[i / LANES].get(i % LANES);
+            let t_end = hits[i / LANES].get(i % LANES).map_or(ray.t_max, |h| h.t);
+            self.rays.push((in_object_space(&ray, object_from_render), [ray.t_min, t_end]));
+        }
+        volume.sample_rays(&self.rays, &mut self.found);
+    }
+
+    /// What ray number `i` collects, if it was computed.
+    pub(super) fn get(&self, i: usize) -> Option<&VolumeSample> {
+        self.found.get(i)
     }
 }
 

@@ -6,6 +6,8 @@
 
 #[cfg(feature = "render")]
 pub(crate) mod exponential;
+#[cfg(feature = "render")]
+pub(crate) mod gather;
 pub(crate) mod huge_pages;
 mod prefetch;
 mod stack;

@@ -205,7 +205,7 @@ impl Volume {
         if whole.dims.min_element() < 2 {
             return Err(VolumeError::NoCells { dims: whole.dims });
         }
-        options.check()?;
+        options.check((whole.spacing * (whole.dims - 1).as_dvec3()).length())?;
         let nearest = options.interpolation == Interpolation::Nearest;
         let blocks = whole.blocks(nearest);
         let brick = Brick { first: brick.first.min(brick.end), end: brick.end.min(blocks) };
@@ -244,7 +244,8 @@ impl Volume {
         let mut part = Volume {
             grid: Arc::new(grid),
             transfer,
-            options,
+            // Samples near the border of a brick would need more ghosts.
+            options: VolumeOptions { sample_distance: None, ..options },
             dims: whole.dims,
             origin: whole.origin,
             first_point: low,
@@ -255,6 +256,7 @@ impl Volume {
             blocks: whole.blocks(nearest),
             report,
             level: Level::new(),
+            samples: None,
         };
         part.find_occupied();
         part

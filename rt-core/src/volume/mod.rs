@@ -9,10 +9,15 @@
 //!
 //! Empty space is skipped by blocks of cells ([`MACROCELL`]) whose range of values has no
 //! extinction, then by cells.
+//!
+//! With [`VolumeOptions::sample_distance`] a ray takes samples instead, as VTK's GPU mapper does:
+//! `samples` (where they lie), `sample_packet` (sixteen rays at a time), `sample_medium`,
+//! `sample_table`, `sample_gradient`, `sample_light`, `empty_space`.
 
 mod adaptive;
 mod brick;
 mod cell_batch;
+mod empty_space;
 mod lanes;
 mod layer;
 mod linear_parts;
@@ -21,6 +26,12 @@ mod options;
 mod projection;
 mod ray_segments;
 mod reference;
+mod sample_gradient;
+mod sample_light;
+mod sample_medium;
+mod sample_packet;
+mod sample_table;
+mod samples;
 mod shading;
 mod shading_in_lanes;
 
@@ -46,6 +57,7 @@ use glam::{DVec3, UVec3};
 use layer::{Layer, MarchState};
 use linear_segment::RayInLanes;
 use rayon::prelude::*;
+use samples::Samples;
 use std::sync::Arc;
 
 /// Cells along an edge of the blocks used to skip empty space.
@@ -151,6 +163,8 @@ pub struct Volume {
     blocks: UVec3,
     report: VolumeReport,
     level: Level,
+    /// `None` where rays are integrated.
+    samples: Option<Samples>,
 }
 
 impl Volume {
@@ -163,7 +177,7 @@ impl Volume {
         if grid.dims.min_element() < 2 {
             return Err(VolumeError::NoCells { dims: grid.dims });
         }
-        options.check()?;
+        options.check((grid.max_corner() - grid.origin).length())?;
         let nearest = options.interpolation == Interpolation::Nearest;
         let cells = if nearest { grid.dims } else { grid.dims - UVec3::ONE };
         let blocks = (cells + MACROCELL - UVec3::ONE) / MACROCELL;
@@ -198,6 +212,7 @@ impl Volume {
             blocks,
             report,
             level: Level::new(),
+            samples: None,
         };
         v.find_occupied();
         Ok(v)
@@ -207,6 +222,14 @@ impl Volume {
     pub fn set_transfer_function(&mut self, transfer: TransferFunction) {
         self.transfer = transfer;
         self.find_occupied();
+    }
+
+    /// Sets [`VolumeOptions::viewer`], which costs no look at the grid.
+    pub fn set_viewer(&mut self, viewer: Option<DVec3>) -> Result<(), VolumeError> {
+        let options = VolumeOptions { viewer, ..self.options.clone() };
+        options.check((self.grid.max_corner() - self.grid.origin).length())?;
+        self.options = options;
+        Ok(())
     }
 
     /// The same volume, integrated with no more than the instruction set `level`; `None` for the
@@ -222,6 +245,7 @@ impl Volume {
         let filled = |r: &[f32; 2]| self.transfer.is_nowhere_clear(r[0].into(), r[1].into());
         self.filled = self.ranges.iter().map(filled).collect();
         self.report.macrocells_clear = self.occupied.iter().filter(|o| !**o).count() as u64;
+        self.samples = Samples::new(self);
     }
 
     /// World position of object space's origin: that of the grid; for a part, that of the whole
@@ -266,6 +290,9 @@ impl Volume {
         }
         if !self.is_medium() {
             return self.project(ray, t0, t1, quality);
+        }
+        if self.takes_samples() {
+            return self.sample_ray(ray, t0 as f32, t1 as f32);
         }
         PartialIntegral::from(self.march(ray, t0, t1, quality, &PartialIntegral::default()))
             .sample()

@@ -1,7 +1,7 @@
 //! Appearance of a volume: shading, blending, and the checks of both.
 
 use crate::grid::GridError;
-use glam::{UVec3, Vec3};
+use glam::{DVec3, UVec3, Vec3};
 use std::sync::Arc;
 
 /// Why a volume cannot be made.
@@ -29,7 +29,21 @@ pub enum VolumeError {
         /// What is allowed.
         rule: &'static str,
     },
+    /// An invalid distance of samples.
+    #[error(
+        "volume: the distance of samples is {distance}; it must be finite and at least {least}, \
+         for fewer than four million of them across the grid"
+    )]
+    SampleDistance {
+        /// The distance given, in world units.
+        distance: f64,
+        /// The smallest one for this grid.
+        least: f64,
+    },
 }
+
+/// Samples along the diagonal of a grid: their numbers are whole in f32 up to four times as many.
+const MOST_SAMPLES: f64 = (1 << 22) as f64;
 
 /// How a highlight falls off around the mirrored light.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -166,12 +180,38 @@ pub struct VolumeOptions {
     /// Extends the scalar past the bounds by its value there, so that gradients across them are
     /// half of those inside, as with OpenGL's clamped textures. Otherwise they are one-sided.
     pub clamped_gradients: bool,
+    /// Distance of samples along a ray, world units: the result of [`Blend::Composite`] is that of
+    /// VTK's GPU mapper. The first sample lies this far behind the point where the ray enters the
+    /// grid. Each stands for a slab of this thickness, by a table of 1,024 entries over the range
+    /// of the transfer function. Lit colours and the gradient opacity's product are at most 1, and
+    /// a ray ends when less than 1/255 of the light passes, so what is left out is less than one
+    /// level. Thin shells between two samples are missed. `None` integrates to the tolerance that
+    /// the caller asks for ([`super::VolumeQuality`]).
+    ///
+    /// Media that share space ([`super::integrate_overlapping`]), bricks
+    /// ([`super::Volume::part`], [`super::RaySegments`]) and grids of 2³¹ points or more are
+    /// integrated in any case.
+    pub sample_distance: Option<f64>,
+    /// Where the viewer is, world units from the grid's origin in the volume's axes: lights at the
+    /// viewer and highlights go by the line from there to the point where a ray enters the grid.
+    /// VTK's GPU mapper does so in parallel projections too, where that is not the ray. `None` goes
+    /// by the ray.
+    pub viewer: Option<DVec3>,
 }
 
 impl VolumeOptions {
-    /// Returns the first error.
-    pub(super) fn check(&self) -> Result<(), VolumeError> {
+    /// Returns the first error. The options are for a grid with this diagonal, world units.
+    pub(super) fn check(&self, diagonal: f64) -> Result<(), VolumeError> {
+        if let Some(distance) = self.sample_distance {
+            let least = diagonal / MOST_SAMPLES;
+            if !(distance >= least && distance.is_finite()) {
+                return Err(VolumeError::SampleDistance { distance, least });
+            }
+        }
         let fault = |field, value, rule| Err(VolumeError::Shading { field, value, rule });
+        if let Some(viewer) = self.viewer.filter(|v| !v.is_finite()) {
+            return fault("viewer", viewer.element_sum() as f32, "a finite position");
+        }
         const DIRECTION: &str = "a direction: finite and not zero";
         if let Some(s) = &self.shading {
             let fields = [("ambient", s.ambient), ("diffuse", s.diffuse)];

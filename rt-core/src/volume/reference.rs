@@ -73,3 +73,55 @@ fn value(volume: &Volume, p: DVec3) -> f64 {
         })
         .sum()
 }
+
+/// [`VolumeOptions::sample_distance`](super::VolumeOptions::sample_distance) in f64, sample by
+/// sample, with the light of one position in a cell.
+#[cfg(test)]
+pub(super) fn samples_reference(volume: &Volume, ray: &Ray, t1: f64) -> [f64; 4] {
+    let grid = volume.grid();
+    let distance = volume.options().sample_distance.expect("a volume with samples");
+    let (o, d) = (ray.origin.as_dvec3(), ray.dir.as_dvec3());
+    let last = (grid.dims - UVec3::ONE).as_dvec3();
+    let (near, far) = super::within(o, d, grid.spacing * last);
+    let (near, step) = (near.max(0.0), distance / d.length());
+    let (index_ray, ..) = volume.index_ray(ray, near, far);
+    let transfer = volume.transfer_function();
+    let [low, high] = transfer.range();
+    let entries = 1024.0;
+    let entry = |i: f64| {
+        let (sigma, color) = transfer.sample(low + (high - low) * i / (entries - 1.0));
+        (-(-sigma * distance).exp_m1(), color)
+    };
+    let (mut rgba, mut through) = ([0.0; 4], 1.0);
+    for k in 1.. {
+        let t = near + f64::from(k) * step;
+        if near >= far || (t > far && k > 1) || t - step >= t1 || through < 1.0 / 255.0 {
+            break;
+        }
+        let p = ((o + d * t) / grid.spacing).clamp(DVec3::ZERO, last);
+        let (cell, s) = if volume.is_nearest() {
+            let point = (p + 0.5).floor().min(last).as_uvec3();
+            (point, grid.at(point.x, point.y, point.z).into())
+        } else {
+            (p.floor().min(last - 1.0).as_uvec3(), value(volume, p))
+        };
+        if !s.is_finite() {
+            continue;
+        }
+        let place = ((s - low) / (high - low) * entries - 0.5).clamp(0.0, entries - 1.0);
+        let (i, f) = (place.floor(), place.fract());
+        let ((a0, c0), (a1, c1)) = (entry(i), entry((i + 1.0).min(entries - 1.0)));
+        let mut alpha = a0 + (a1 - a0) * f;
+        let mut color = std::array::from_fn(|c| c0[c] + (c1[c] - c0[c]) * f);
+        let at = (p - cell.as_dvec3()).to_array();
+        if let Some(light) = volume.light_along(&index_ray, cell, [0.0, 1.0], &at, &at) {
+            (alpha, color) = light.on(0.5, alpha, color);
+        }
+        for c in 0..3 {
+            rgba[c] += through * alpha * color[c].min(1.0);
+        }
+        through *= 1.0 - alpha;
+    }
+    rgba[3] = 1.0 - through;
+    rgba
+}

@@ -1,6 +1,6 @@
 //! Gradients of a cell, and shading by lights.
 
-use super::{GradientOpacity, Volume, VolumeHighlight, VolumeShading};
+use super::{GradientOpacity, Volume, VolumeHighlight, VolumeShading, within};
 use crate::grid::Grid;
 use crate::grid_walk::IndexRay;
 use glam::{DVec3, UVec3, Vec3};
@@ -43,6 +43,24 @@ impl ShadingCurve<'_> {
 }
 
 impl Volume {
+    /// The direction in which lights at the viewer shine through the volume along a ray, which
+    /// starts at `o` in object space and goes along `d`. Not a unit vector.
+    pub(super) fn view_along(&self, o: DVec3, d: DVec3) -> DVec3 {
+        let Some(viewer) = self.options.viewer else { return d };
+        let extent = self.grid.spacing * (self.dims - UVec3::ONE).as_dvec3();
+        let (near, far) = within(o, d, extent);
+        let view = o + d * near.max(0.0) - viewer;
+        // A ray that misses the grid, or begins at the viewer.
+        if near < far && view.length_squared() > 0.0 { view } else { d }
+    }
+
+    /// [`Volume::view_along`] for a ray in cells.
+    pub(super) fn view_along_index(&self, ray: &IndexRay) -> DVec3 {
+        let [o, d] = [ray.o, ray.d].map(|v| DVec3::from_array(v) * self.grid.spacing);
+        // Boxes around points begin half a spacing before the grid.
+        self.view_along(if self.is_nearest() { o - 0.5 * self.grid.spacing } else { o }, d)
+    }
+
     /// Whether colours or extinctions depend on gradients.
     pub(super) fn has_light(&self) -> bool {
         self.options.shading.is_some() || self.options.gradient_opacity.is_some()
@@ -61,7 +79,7 @@ impl Volume {
         if !self.has_light() {
             return None;
         }
-        let dir = DVec3::from_array(ray.d) * self.grid.spacing;
+        let dir = self.view_along_index(ray);
         let ends = if self.is_nearest() {
             // The gradient at the point around which the box lies.
             [self.lit(
@@ -207,7 +225,11 @@ pub(super) fn corner_gradients(grid: &Grid, cell: UVec3, clamped: bool) -> [Vec3
 
 #[cfg(test)]
 mod tests {
+    use super::super::{Interpolation, VolumeOptions, VolumeQuality};
     use super::*;
+    use crate::colormap::ColorMap;
+    use crate::ray::Ray;
+    use crate::transfer_function::TransferFunction;
 
     #[test]
     fn gradients_inside_and_at_the_bounds_are_one_function() {
@@ -228,5 +250,100 @@ mod tests {
             (2.0 * clamped.x, clamped.y),
             "half across the bounds"
         );
+    }
+
+    /// Waves with light at the viewer; `how` is applied to the options.
+    fn lit_waves(how: impl Fn(VolumeOptions) -> VolumeOptions) -> Volume {
+        let dims = UVec3::new(17, 13, 11);
+        let values = (0..dims.element_product()).map(|i| {
+            let p = UVec3::new(i % 17, i / 17 % 13, i / 221).as_vec3();
+            (0.6 * p.x).sin() * (0.5 * p.y).cos() + 0.3 * (0.8 * p.z).sin()
+        });
+        let spacing = DVec3::new(0.5, 1.0, 1.5);
+        let grid = Grid::new(dims, DVec3::new(3.0, -2.0, 1.0), spacing, values.collect());
+        let colors = ColorMap::new(vec![[0.1, 0.2, 1.0, 1.0], [1.0, 0.4, 0.1, 1.0]], [-1.3, 1.3]);
+        let opacity = [[-1.3, 0.0], [0.0, 0.1], [1.3, 0.3]];
+        let transfer = TransferFunction::from_opacity(colors, &opacity, 1.0).unwrap();
+        let shading = VolumeShading { ambient: 0.1, diffuse: 0.8, ..VolumeShading::default() };
+        let options = VolumeOptions { shading: Some(shading), ..VolumeOptions::default() };
+        Volume::new(grid.unwrap().into(), transfer, how(options)).unwrap()
+    }
+
+    /// Both ways through a volume, with cells between points and around them.
+    fn ways() -> Vec<(Option<f64>, Interpolation)> {
+        let kinds = [Interpolation::Linear, Interpolation::Nearest];
+        kinds.into_iter().flat_map(|kind| [(None, kind), (Some(0.3), kind)]).collect()
+    }
+
+    fn largest_difference(a: &Volume, b: &Volume, ray: &Ray) -> f32 {
+        let quality = VolumeQuality::Tolerance { levels: 0.05 };
+        let [a, b] = [a, b].map(|v| v.integrate(ray, 0.0, f32::INFINITY, &quality).rgba);
+        (0..4).map(|c| (a[c] - b[c]).abs()).fold(0.0, f32::max)
+    }
+
+    /// In f32 a direction is known to 10⁻⁷, a highlight and the sum of samples to a hundred times
+    /// that; halving goes another way for it, within its tolerance of 0.05 levels.
+    const SAME: f32 = 0.1 / 255.0;
+
+    #[test]
+    fn a_viewer_at_the_origin_of_the_rays_changes_nothing() {
+        let viewer = DVec3::new(-9.0, 14.0, 30.0);
+        for (sample_distance, interpolation) in ways() {
+            let with = |viewer| {
+                lit_waves(|o| VolumeOptions {
+                    shading: o.shading.map(|s| VolumeShading {
+                        specular: 0.5,
+                        shininess: 9.0,
+                        highlight: VolumeHighlight::Mirrored,
+                        ..s
+                    }),
+                    sample_distance,
+                    interpolation,
+                    viewer,
+                    ..o
+                })
+            };
+            let (by_ray, by_place) = (with(None), with(Some(viewer)));
+            for k in 0..40u8 {
+                let to = DVec3::new(0.2 * f64::from(k), 0.3 * f64::from(k), 14.0);
+                let ray = Ray::new(viewer.as_vec3(), (to - viewer).as_vec3());
+                let off = largest_difference(&by_ray, &by_place, &ray);
+                assert!(off < SAME, "{k} {sample_distance:?} {interpolation:?}: {off}");
+            }
+        }
+    }
+
+    #[test]
+    fn parallel_rays_are_lit_from_the_viewers_place() {
+        let viewer = DVec3::new(4.0, 6.0, 40.0);
+        let extent = DVec3::new(8.0, 12.0, 15.0);
+        for (sample_distance, interpolation) in ways() {
+            let options = |o| VolumeOptions { sample_distance, interpolation, ..o };
+            let by_ray = lit_waves(options);
+            let by_place = lit_waves(|o| VolumeOptions { viewer: Some(viewer), ..options(o) });
+            let mut moved = by_ray.clone();
+            moved.set_viewer(Some(viewer)).unwrap();
+            let mut apart = 0.0f32;
+            for k in 0..40u8 {
+                let (x, y) = (0.1 + 0.19 * f64::from(k), 0.1 + 0.29 * f64::from(k));
+                let ray = Ray::new(DVec3::new(x, y, 40.0).as_vec3(), -Vec3::Z);
+                // The same light, with its direction given.
+                let entry = DVec3::new(x, y, extent.z);
+                let fixed = lit_waves(|o| VolumeOptions {
+                    shading: o
+                        .shading
+                        .map(|s| VolumeShading { light: Some((viewer - entry).as_vec3()), ..s }),
+                    ..options(o)
+                });
+                let off = largest_difference(&by_place, &fixed, &ray);
+                assert!(off < SAME, "{k} {sample_distance:?} {interpolation:?}: {off}");
+                assert_eq!(largest_difference(&by_place, &moved, &ray), 0.0);
+                apart = apart.max(largest_difference(&by_place, &by_ray, &ray));
+            }
+            assert!(apart > 2.0 / 255.0, "the light depends on the place: {apart}");
+        }
+        let nowhere = Some(DVec3::new(f64::NAN, 0.0, 0.0));
+        let fault = lit_waves(|o| o).set_viewer(nowhere).expect_err("not a place");
+        assert!(fault.to_string().contains("viewer"), "{fault}");
     }
 }

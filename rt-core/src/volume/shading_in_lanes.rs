@@ -73,7 +73,7 @@ impl Volume {
     /// The lights along `ray`; `None` without shading.
     pub(super) fn lights_on(&self, ray: &IndexRay) -> Option<LightsOnRay> {
         let s = self.options.shading.as_ref()?;
-        let dir = DVec3::from_array(ray.d) * self.grid.spacing;
+        let dir = self.view_along_index(ray);
         let unit = |l: Option<glam::Vec3>| l.map_or(dir, |l| l.as_dvec3()).normalize_or_zero();
         let colored = !self.options.lights.is_empty();
         let lights = if colored {

@@ -4,7 +4,7 @@ import os
 
 import numpy as np
 
-ABI = 67577348
+ABI = 2667571646
 #: The first VTK whose renderers Python can replace.
 OLDEST_VTK = (9, 4)
 NONE, U8, F32, F64, I32, I64 = range(6)
@@ -67,9 +67,9 @@ class Volume(C.Structure):
     _fields_ = [
         ("name", C.c_char_p), ("scalar_key", C.c_uint64), ("scalars", Array), ("dims", C.c_uint32 * 3), ("nearest", C.c_uint32),
         ("spacing", C.c_double * 3), ("world_from_data", C.c_double * 16), ("range", C.c_double * 2), ("colors", Array), ("opacities", Array),
-        ("unit_distance", C.c_double), ("shade", C.c_uint32), ("ambient", C.c_float), ("diffuse", C.c_float), ("specular", C.c_float),
+        ("unit_distance", C.c_double), ("sample_distance", C.c_double), ("viewer", C.c_double * 3), ("shade", C.c_uint32), ("ambient", C.c_float), ("diffuse", C.c_float), ("specular", C.c_float),
         ("specular_power", C.c_float), ("specular_mirrored", C.c_uint32), ("lights", Array), ("gradient_opacities", Array),
-        ("steepest", C.c_double), ("blend", C.c_uint32), ("reserved", C.c_uint32), ("isovalues", Array),
+        ("steepest", C.c_double), ("blend", C.c_uint32), ("has_viewer", C.c_uint32), ("isovalues", Array),
     ]
 
 

@@ -1,4 +1,6 @@
 """Volumes on uniform grids. Which of them are traced decides the library from facts about them."""
+import math
+
 import numpy as np
 from vtkmodules.vtkCommonCore import reference
 from vtkmodules.vtkCommonDataModel import vtkCompositeDataSet, vtkImageData
@@ -88,6 +90,27 @@ def _scalars_of(mapper, image, f):
     return scalars
 
 
+def _sample_distance(mapper, image, dims, matrix):
+    """The distance of the samples that OpenGL takes along a ray, in data units; 0 for mappers that take none in OpenGL, or that move
+    them by noise, whose mean is the integral."""
+    if any(mapper.IsA(kind) for kind in ("vtkGPUVolumeRayCastMapper", "vtkSmartVolumeMapper")) and mapper.GetUseJittering():
+        return 0
+    spacing = image.GetSpacing()
+    # Half of the mean spacing, and less in grids of fewer than a million cells.
+    size = min(1, math.prod(n - 1 for n in dims) ** 0.333 / 100)
+    locked = sum(spacing) / 6 * (0.01 + 0.99 * size)
+    if mapper.IsA("vtkGPUVolumeRayCastMapper"):
+        adjusts, own = mapper.GetAutoAdjustSampleDistances(), mapper.GetSampleDistance()
+        if mapper.GetLockSampleDistanceToInputSpacing() and not 0.999 <= own / locked <= 1.001:
+            own = locked
+    elif mapper.IsA("vtkSmartVolumeMapper"):
+        adjusts, own = not mapper.GetInteractiveAdjustSampleDistances() and mapper.GetAutoAdjustSampleDistances(), locked
+    else:
+        return 0
+    # The smallest spacing in the world. While the user turns the scene OpenGL may take longer steps.
+    return min(s * math.hypot(*(matrix.GetElement(i, j) for j in range(3))) for i, s in enumerate(spacing)) if adjusts else own
+
+
 class Volumes:
     """Tables of transfer functions; those of the last frame are cached."""
 
@@ -109,9 +132,9 @@ class Volumes:
         image = _image_of(mapper, f)
         if image is None:
             require(bridge.check_volume, f)
-        self._add_grid(bridge, mapper, volume, image, lights, name, f)
+        self._add_grid(bridge, mapper, volume, image, renderer.GetActiveCamera(), lights, name, f)
 
-    def _add_grid(self, bridge, mapper, volume, image, lights, name, f):
+    def _add_grid(self, bridge, mapper, volume, image, camera, lights, name, f):
         p, v, keep = volume.GetProperty(), rtv.Volume(), []
         v.name = name.encode()
         extent = image.GetExtent()
@@ -151,7 +174,11 @@ class Volumes:
             reach = sum(n / (n - 1) for n in dims) / 3
             v.gradient_opacities, v.steepest = rtv.Array.of(gradients), _GRADIENT_RANGE * (high - low) / (sum(image.GetSpacing()) / 3 * reach)
         v.unit_distance = p.GetScalarOpacityUnitDistance(0)
+        v.sample_distance = _sample_distance(mapper, image, dims, volume.GetMatrix())
         v.nearest, v.shade = p.GetInterpolationType() == 0, bool(p.GetShade(0))
+        if camera.GetParallelProjection():
+            # OpenGL's light at the viewer shines from the camera's position then, too.
+            v.has_viewer, v.viewer[:] = 1, camera.GetPosition()
         if lights.rows:
             keep.append(np.array(lights.rows, np.float32))
             v.lights = rtv.Array.of(keep[-1])

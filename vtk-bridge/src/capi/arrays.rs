@@ -5,7 +5,7 @@ use crate::input::{
     Cells, Color, Glyphs, Ids, Image, LightKind, Maps, PerItem, Points, Property, Scalars,
     SceneLight, Shading, Shape, Surface, Volume, VolumeBlend,
 };
-use rt_core::glam::DMat4;
+use rt_core::glam::{DMat4, DVec3};
 
 /// Returns `array` as a slice of `N` numbers per element; empty when there is no array.
 ///
@@ -215,6 +215,8 @@ pub(super) unsafe fn volume<'a>(v: &RtvVolume, name: &'a str) -> Result<Volume<'
             colors: tuples(&v.colors, "colours", RTV_F32)?,
             opacities: opacities.as_flattened(),
             unit_distance: v.unit_distance,
+            sample_distance: v.sample_distance,
+            viewer: (v.has_viewer != 0).then(|| DVec3::from_array(v.viewer)),
             shading: (v.shade != 0).then_some(Shading {
                 ambient: v.ambient,
                 diffuse: v.diffuse,

@@ -36,7 +36,7 @@ pub struct RtvBridge {
 
 /// Version of this interface, computed from its structures and calls (a test gives the value). A
 /// shim built for another version must not continue.
-pub const RTV_ABI: u32 = 67_577_348;
+pub const RTV_ABI: u32 = 2_667_571_646;
 
 /// [`RTV_ABI`] of the library.
 #[unsafe(no_mangle)]

@@ -252,6 +252,11 @@ pub struct RtvVolume {
     pub opacities: RtvArray,
     /// See opacities.
     pub unit_distance: f64,
+    /// Distance of the mapper's samples, data units, of which RTV_BLEND_COMPOSITE takes the same;
+    /// 0 integrates instead.
+    pub sample_distance: f64,
+    /// World position of the camera, with has_viewer.
+    pub viewer: [f64; 3],
     /// 1 for shading by the gradient.
     pub shade: u32,
     /// Of the shading.
@@ -274,8 +279,9 @@ pub struct RtvVolume {
     pub steepest: f64,
     /// One of RTV_BLEND_*.
     pub blend: u32,
-    /// Not used.
-    pub reserved: u32,
+    /// 1: lights at the viewer and highlights go by lines from viewer, not by the rays, which in
+    /// parallel projections differ.
+    pub has_viewer: u32,
     /// Scalars of the surfaces of RTV_BLEND_ISOSURFACES, f64.
     pub isovalues: RtvArray,
 }

@@ -1,0 +1,141 @@
+//! Loads from sixteen places at once.
+//!
+//! Pairs of neighbours are what an interpolant reads, and one load of eight bytes costs as much as
+//! one of four: AVX-512 gathers sixteen pairs with half of the loads of two gathers of numbers.
+
+use fearless_simd::{Bytes, Simd, SimdBase, SimdFrom, f32x16, i32x16, u32x16};
+
+/// Numbers that can be gathered: at least two, and few enough for indices of 32 bits.
+#[derive(Clone, Copy)]
+pub(crate) struct GatherSlice<'a> {
+    values: &'a [f32],
+    /// Index of the last pair.
+    last: u32,
+}
+
+impl<'a> GatherSlice<'a> {
+    /// `None` for fewer than two numbers, or more than an index of 32 bits counts.
+    #[inline]
+    pub(crate) fn new(values: &'a [f32]) -> Option<Self> {
+        let last = i32::try_from(values.len()).ok()?.checked_sub(2)?;
+        Some(GatherSlice { values, last: u32::try_from(last).ok()? })
+    }
+
+    /// `values[i]` and `values[i + 1]` for each index, which is clamped to the last pair.
+    #[inline(always)]
+    pub(crate) fn pairs<S: Simd>(self, simd: S, index: i32x16<S>) -> [f32x16<S>; 2] {
+        let index = index.bitcast::<u32x16<S>>().min(u32x16::splat(simd, self.last));
+        let index: [u32; 16] = index.into();
+        #[cfg(target_arch = "x86_64")]
+        if simd.level().as_avx512().is_some() {
+            // SAFETY: the processor has AVX-512, and every index is at most `last`, so both
+            // numbers of the pair are in `values`.
+            let [a, b] = unsafe { pairs_avx512(self.values.as_ptr(), &index) };
+            return [f32x16::simd_from(simd, a), f32x16::simd_from(simd, b)];
+        }
+        self.pairs_one_by_one(&index).map(|row| f32x16::simd_from(simd, row))
+    }
+
+    /// `values[i]` for each index, which is clamped to the first of the last pair.
+    #[inline(always)]
+    pub(crate) fn numbers<S: Simd>(self, simd: S, index: i32x16<S>) -> f32x16<S> {
+        let index = index.bitcast::<u32x16<S>>().min(u32x16::splat(simd, self.last));
+        let index: [u32; 16] = index.into();
+        #[cfg(target_arch = "x86_64")]
+        if simd.level().as_avx512().is_some() {
+            // SAFETY: the processor has AVX-512, and every index is at most `last`.
+            let a = unsafe { numbers_avx512(self.values.as_ptr(), &index) };
+            return f32x16::simd_from(simd, a);
+        }
+        f32x16::simd_from(simd, self.numbers_one_by_one(&index))
+    }
+
+    // Not inlined: a gradient reads sixteen pairs of sixteen lanes, and with all of their loads in
+    // one function rt-core took three times as long to compile.
+    #[inline(never)]
+    fn pairs_one_by_one(self, index: &[u32; 16]) -> [[f32; 16]; 2] {
+        let mut out = [[0.0; 16]; 2];
+        for (lane, i) in index.iter().enumerate() {
+            let i = i.min(&self.last);
+            // SAFETY: the index is at most `last`, which is two less than the length.
+            let at = |i: usize| unsafe { *self.values.get_unchecked(i) };
+            (out[0][lane], out[1][lane]) = (at(*i as usize), at(*i as usize + 1));
+        }
+        out
+    }
+
+    #[inline(never)]
+    fn numbers_one_by_one(self, index: &[u32; 16]) -> [f32; 16] {
+        // SAFETY: the index is at most `last`, which is less than the length.
+        index.map(|i| unsafe { *self.values.get_unchecked(i.min(self.last) as usize) })
+    }
+}
+
+/// # Safety
+/// The processor has AVX-512, and `values` is readable at each index and behind it. Indices are
+/// less than 2³¹.
+#[cfg(target_arch = "x86_64")]
+#[inline]
+#[target_feature(enable = "avx512f")]
+unsafe fn pairs_avx512(values: *const f32, index: &[u32; 16]) -> [[f32; 16]; 2] {
+    use std::arch::x86_64::*;
+    // SAFETY: loads of arrays of this size, and the caller's promise for the gathers, which need no
+    // alignment.
+    unsafe {
+        let index = _mm512_loadu_si512(index.as_ptr().cast());
+        let low = _mm512_castsi512_si256(index);
+        let high = _mm512_extracti64x4_epi64::<1>(index);
+        let low = _mm512_castpd_ps(_mm512_i32gather_pd::<4>(low, values.cast()));
+        let high = _mm512_castpd_ps(_mm512_i32gather_pd::<4>(high, values.cast()));
+        let even = _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
+        let odd = _mm512_setr_epi32(1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23, 25, 27, 29, 31);
+        let mut out = [[0.0; 16]; 2];
+        _mm512_storeu_ps(out[0].as_mut_ptr(), _mm512_permutex2var_ps(low, even, high));
+        _mm512_storeu_ps(out[1].as_mut_ptr(), _mm512_permutex2var_ps(low, odd, high));
+        out
+    }
+}
+
+/// # Safety
+/// The processor has AVX-512, and `values` is readable at each index. Indices are less than 2³¹.
+#[cfg(target_arch = "x86_64")]
+#[inline]
+#[target_feature(enable = "avx512f")]
+unsafe fn numbers_avx512(values: *const f32, index: &[u32; 16]) -> [f32; 16] {
+    use std::arch::x86_64::*;
+    // SAFETY: as above.
+    unsafe {
+        let index = _mm512_loadu_si512(index.as_ptr().cast());
+        let mut out = [0.0; 16];
+        _mm512_storeu_ps(out.as_mut_ptr(), _mm512_i32gather_ps::<4>(index, values));
+        out
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simd::SimdLevel;
+    use fearless_simd::dispatch;
+
+    #[test]
+    fn gathers_read_the_same_with_every_instruction_set_and_stay_inside() {
+        let values: Vec<f32> = (0..37).map(|i| i as f32).collect();
+        let slice = GatherSlice::new(&values).expect("two or more");
+        let index =
+            [0, 35, 36, 37, -1, i32::MIN, i32::MAX, 3, 1, 34, 33, 2, 17, 18, 1 << 20, -1000];
+        for level in SimdLevel::available() {
+            let level = SimdLevel::resolve(Some(level)).expect("available");
+            dispatch!(level, simd => {
+                let index = i32x16::simd_from(simd, index);
+                let [a, b] = slice.pairs(simd, index);
+                let one = slice.numbers(simd, index);
+                for lane in 0..16 {
+                    let i = (index[lane] as u32).min(35) as f32;
+                    assert_eq!((a[lane], b[lane], one[lane]), (i, i + 1.0, i), "{level:?} {lane}");
+                }
+            });
+        }
+        assert!(GatherSlice::new(&values[..1]).is_none() && GatherSlice::new(&[]).is_none());
+    }
+}
