@@ -35,6 +35,11 @@ const QUADRATIC_SHARE: f64 = 0.7;
 /// deflections are 3.5 times the difference that this makes once.
 const UNRESOLVED: f64 = 2.0;
 
+/// How far a point's value goes to the spline's. With 1, the bow shock before a blunt fin is blurred
+/// by a cell (root mean square 1.0 % of the range about it, 0.6 % with this, 0.3 % with 0); with 0,
+/// each cell along the shock shows far behind.
+const TO_SPLINE: f64 = 0.5;
+
 /// Number of samples of a spline: on a cubic grid, those that share a cell.
 const ADJACENT: usize = 26;
 /// The nearest of them, as on a cubic grid. The spline gives each a quarter of the point's own
@@ -321,7 +326,10 @@ impl Fit {
         let share = share_of(solution.residual);
         let mut coefficients = solution.coefficients.map(|c| share * c);
         if share < 1.0 {
-            let spline = spline_at(within(&self.samples, ADJACENT), free);
+            let mut spline = spline_at(within(&self.samples, ADJACENT), free);
+            if !free {
+                spline[0] *= TO_SPLINE;
+            }
             for (sum, c) in coefficients.iter_mut().zip(spline) {
                 *sum += (1.0 - share) * c;
             }

@@ -10,8 +10,8 @@
 //! gradients) where the field is smooth.
 //!
 //! Where no polynomial fits, as at shocks, the mesh does not tell where in a cell the field changes.
-//! A cubic B-spline with the values as its coefficients takes the polynomial's place. It does not
-//! go through the values, but makes no new extrema, and shows no cells: a shock that crosses the
+//! A cubic B-spline with the values as its coefficients takes the polynomial's place, half-way from
+//! the value of the point. It makes no new extrema, and shows no cells: a shock that crosses the
 //! lines of a grid obliquely has no stairs.
 //!
 //! Values of cells are taken as what solvers of finite volumes mean by them, averages over the
