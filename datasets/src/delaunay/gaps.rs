@@ -21,6 +21,7 @@
 //!    found, until no more are: cospherical points of a body may have many cells in it.
 //! 5. From gaps, the place without points goes on into cells next to them with two thirds of that
 //!    (hysteresis, Canny 1986): up to where a body becomes as thin as its points are apart.
+//! 6. Gaps of a few cells are chance, and closed again.
 //!
 //! What it cannot tell: a body, or its tail, that is thinner than two or three distances between
 //! the points along its wall looks like gas. A cloud that is regular in one part and random in
@@ -29,8 +30,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Default of `spacings`. In a lattice, bodies four steps wide are found. Of seven
-/// clouds of 30,000 points by chance in a square, one had such a place inside, of three cells.
+/// Default of `spacings`. In a lattice, bodies four steps wide are found.
 pub(crate) const SPACINGS: f64 = 2.7;
 /// Part of the threshold down to which a gap grows.
 const GROWTH: f64 = 2.0 / 3.0;
@@ -38,6 +38,10 @@ const GROWTH: f64 = 2.0 / 3.0;
 const LOWER: f64 = 1.0 / 3.0;
 /// Among all cells in order of their stretch, where the usual one stands.
 const USUAL: f64 = 0.8;
+
+/// Cells of a gap, at least, in a plane and in space. Points by chance leave places of a few cells,
+/// mostly at the hull, and a body four steps wide has more.
+const LEAST_CELLS: [usize; 2] = [8, 24];
 
 /// Which cells are gaps.
 #[derive(Debug, Clone, PartialEq)]
@@ -109,6 +113,7 @@ pub(crate) fn find<const N: usize>(points: &[DVec3], corners: &[[u32; N]], spaci
         candidates = sorted(beside.iter().flat_map(|p| cloud.around.of(*p as usize)).copied());
     }
     cloud.grow(GROWTH * threshold);
+    cloud.close_small(LEAST_CELLS[usize::from(N > 3)]);
     let cells = cloud.is_gap.iter().filter(|g| **g).count();
     Gaps { is_gap: cloud.is_gap, cells }
 }
@@ -171,23 +176,56 @@ impl<const N: usize> Cloud<'_, N> {
         self.sizes[cell] / spacings.into_iter().fold(0.0, f64::max)
     }
 
+    /// The cells that share a face with a cell, and the cell itself.
+    fn beside(&self, cell: u32) -> impl Iterator<Item = u32> + '_ {
+        let corners = self.corners[cell as usize];
+        (0..N).flat_map(move |skipped| {
+            let shares = move |other: &u32| {
+                let others = &self.corners[*other as usize];
+                corners.iter().enumerate().all(|(i, p)| i == skipped || others.contains(p))
+            };
+            self.around.of(corners[(skipped + 1) % N] as usize).iter().copied().filter(shares)
+        })
+    }
+
+    fn gap_cells(&self) -> Vec<u32> {
+        (0..self.corners.len() as u32).filter(|c| self.is_gap[*c as usize]).collect()
+    }
+
     /// Lets the gaps grow into neighbours that are wider than `limit`.
     fn grow(&mut self, limit: f64) {
-        let mut front: Vec<u32> =
-            (0..self.corners.len() as u32).filter(|c| self.is_gap[*c as usize]).collect();
+        let mut front = self.gap_cells();
         while let Some(cell) = front.pop() {
-            let face = self.corners[cell as usize];
-            for skipped in 0..N {
-                for &other in self.around.of(face[(skipped + 1) % N] as usize) {
-                    let shares = |p: &u32| self.corners[other as usize].contains(p);
-                    if !self.is_gap[other as usize]
-                        && self.stretch(other as usize) > limit
-                        && face.iter().enumerate().all(|(i, p)| i == skipped || shares(p))
-                    {
-                        self.is_gap[other as usize] = true;
-                        front.push(other);
+            let is_next = |c: &u32| !self.is_gap[*c as usize] && self.stretch(*c as usize) > limit;
+            let next: Vec<u32> = self.beside(cell).filter(is_next).collect();
+            for &other in &next {
+                self.is_gap[other as usize] = true;
+            }
+            front.extend(next);
+        }
+    }
+
+    /// Makes gaps of fewer cells than `least` none.
+    fn close_small(&mut self, least: usize) {
+        let mut seen = vec![false; self.corners.len()];
+        for first in self.gap_cells() {
+            if seen[first as usize] {
+                continue;
+            }
+            seen[first as usize] = true;
+            let mut gap = vec![first];
+            let mut at = 0;
+            while let Some(&cell) = gap.get(at) {
+                at += 1;
+                for other in self.beside(cell) {
+                    if self.is_gap[other as usize] && !seen[other as usize] {
+                        seen[other as usize] = true;
+                        gap.push(other);
                     }
                 }
+            }
+            if gap.len() < least {
+                gap.into_iter().for_each(|c| self.is_gap[c as usize] = false);
             }
         }
     }

@@ -6,9 +6,9 @@
 //! collapsed edges) or Newton fails, the cell becomes a fan of tetrahedra around its centre and the
 //! centres of its faces, which joins its neighbours at their corners and edges.
 //!
-//! Polynomials of corners that disagree, as at shocks, would be joined with a kink at each face: the
-//! shares of elements have slopes there. Those of hexahedra can be taken at smoothstep parameters
-//! instead ([`Shares::Smooth`]), which have none.
+//! Polynomials of corners that disagree, as at shocks, would be joined with a kink at each face:
+//! the shares of elements have slopes there. Those of hexahedra can be taken at smoothstep
+//! parameters instead ([`Shares::Smooth`]), which have none.
 
 use super::mesh::Shape;
 use glam::{DMat3, DVec3};

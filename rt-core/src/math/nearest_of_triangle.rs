@@ -15,6 +15,13 @@ pub struct NearestOfTriangle {
 
 /// The closest point to the origin of the triangle with `corners`, in `f64`. Triangles without area
 /// are segments or points.
+///
+/// ```
+/// use rt_core::{glam::DVec3, math::{NearestOfTriangle, nearest_of_triangle}};
+/// let triangle = [DVec3::new(-1.0, 0.0, 3.0), DVec3::new(1.0, 0.0, 3.0), DVec3::new(0.0, 5.0, 3.0)];
+/// let NearestOfTriangle { distance2, u, v } = nearest_of_triangle(triangle);
+/// assert_eq!([distance2, u, v], [9.0, 0.5, 0.0]);
+/// ```
 pub fn nearest_of_triangle(corners: [DVec3; 3]) -> NearestOfTriangle {
     let [a, b, c] = corners;
     let (ab, ac) = (b - a, c - a);

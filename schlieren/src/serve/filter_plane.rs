@@ -1,7 +1,8 @@
 //! Computes what the page shows of the filter: its transmission, the distribution of light on it,
 //! and the point where a pixel's light crosses it.
 
-use super::frame::{DeflectionMap, srgb_byte};
+use super::deflection_map::DeflectionMap;
+use super::srgb_byte::srgb_byte;
 use crate::cutoff::painted::{Painting, Stroke};
 use crate::cutoff::{Cutoff, CutoffPlane, Rgb};
 use crate::film::Framing;

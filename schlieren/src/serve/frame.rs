@@ -1,11 +1,11 @@
 //! Packs a rendered image for the page: numbers as JSON, then pixels.
 
+use super::deflection_map::DeflectionMap;
 use super::filter_plane::{FilterPlane, PIXELS};
 use super::legend::{self, Legend};
-use crate::film::Framing;
+use super::srgb_byte::srgb_byte;
 use crate::render::{Map, RenderOutput};
 use rayon::prelude::*;
-use rt_core::colormap::linear_to_srgb;
 use serde::Serialize;
 use std::sync::Arc;
 
@@ -76,32 +76,6 @@ pub struct FrameInfo {
     pub legend_pixels: usize,
     /// Deflection at the middle of each side of the legend.
     pub legend_half_rad: f64,
-}
-
-/// The deflections of a view, for tracing pixels to the filter.
-pub(super) struct DeflectionMap {
-    pub(super) map: Map,
-    pub(super) framing: Framing,
-    /// The deflection that all but few rays stay below. A shock deflects these far: with them the
-    /// rest of the light would shrink to a dot.
-    pub(super) strong_rad: f64,
-}
-
-impl DeflectionMap {
-    pub(super) fn new(map: Map, framing: Framing) -> DeflectionMap {
-        let mut sizes: Vec<f32> = map.deflection_rad.iter().map(|d| d[0].hypot(d[1])).collect();
-        let mut strong_rad = 0.0;
-        if !sizes.is_empty() {
-            let at = sizes.len() * 995 / 1000;
-            strong_rad = f64::from(*sizes.select_nth_unstable_by(at, f32::total_cmp).1);
-        }
-        DeflectionMap { map, framing, strong_rad }
-    }
-}
-
-/// Linear light as the page's pixels have it. The cast turns NaN into 0.
-pub(super) fn srgb_byte(v: f32) -> u8 {
-    (255.0 * linear_to_srgb(v.clamp(0.0, 1.0))).round() as u8
 }
 
 /// A frame as it is stored and sent.

@@ -1,6 +1,6 @@
 //! What the colours of a schlieren image mean: the colour of each deflection.
 
-use super::frame::srgb_byte;
+use super::srgb_byte::srgb_byte;
 use crate::path::{Exit, Start};
 use crate::render::{RenderError, technique};
 use crate::scene::{Scene, TechniqueSpec};

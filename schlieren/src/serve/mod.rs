@@ -7,6 +7,7 @@
 //! the scene changes. All open pages show the same scene. The page cannot open or write files: it
 //! changes how the flow is viewed, and downloads images.
 
+mod deflection_map;
 mod filter_plane;
 mod flow;
 mod frame;
@@ -14,6 +15,7 @@ mod legend;
 mod merge_patch;
 mod routes;
 mod session;
+mod srgb_byte;
 mod worker;
 
 pub use flow::ArrayInfo;

@@ -15,9 +15,10 @@
 mod files;
 mod levels;
 
+use super::deflection_map::DeflectionMap;
 use super::filter_plane::{FilterPlane, legend_half_rad};
 use super::flow::Flow;
-use super::frame::{DeflectionMap, Frame, FrameInfo};
+use super::frame::{Frame, FrameInfo};
 use super::legend::Legend;
 use super::session::{Session, chain};
 use crate::drawing::{Canvas, Overlay, draw_overlay};

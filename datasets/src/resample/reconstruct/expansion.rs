@@ -31,13 +31,12 @@ const RESIDUAL: [f64; 2] = [0.1, 0.25];
 const QUADRATIC_SHARE: f64 = 0.7;
 
 /// Where a polynomial gives way, the error is larger than what the spline adds: a step between two
-/// points may be anywhere between them. Of a shock that is half as thick as a tetrahedron is wide,
-/// deflections are 3.5 times the difference that this makes once.
+/// points may be anywhere between them.
 const UNRESOLVED: f64 = 2.0;
 
-/// How far a point's value goes to the spline's. With 1, the bow shock before a blunt fin is blurred
-/// by a cell (root mean square 1.0 % of the range about it, 0.6 % with this, 0.3 % with 0); with 0,
-/// each cell along the shock shows far behind.
+/// How far a point's value goes to the spline's. With 1, the bow shock at the nose of a blunt fin is
+/// blurred by a cell (by 1.0 % of the range there, root mean square; 0.6 % with this, 0.3 % with
+/// 0). With 0, each cell along the shock shows far behind.
 const TO_SPLINE: f64 = 0.5;
 
 /// Number of samples of a spline: on a cubic grid, those that share a cell.

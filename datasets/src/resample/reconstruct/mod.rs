@@ -9,10 +9,10 @@
 //! for cubic fields, and with an error of fourth order in the size of the cells (third order for
 //! gradients) where the field is smooth.
 //!
-//! Where no polynomial fits, as at shocks, the mesh does not tell where in a cell the field changes.
-//! A cubic B-spline with the values as its coefficients takes the polynomial's place, half-way from
-//! the value of the point. It makes no new extrema, and shows no cells: a shock that crosses the
-//! lines of a grid obliquely has no stairs.
+//! Where no polynomial fits, as at shocks, the mesh does not tell where in a cell the field
+//! changes. A cubic B-spline with the values as its coefficients takes the polynomial's place,
+//! half-way from the value of the point. It makes no new extrema, and shows no cells: a shock that
+//! crosses the lines of a grid obliquely has no stairs.
 //!
 //! Values of cells are taken as what solvers of finite volumes mean by them, averages over the
 //! cells: the averages of the polynomials are fitted to them ([`cell_moments`]).
@@ -40,7 +40,7 @@ use rayon::prelude::*;
 pub enum Reconstruction {
     /// By the linear, bilinear and trilinear functions of the cells. Gradients jump at the faces.
     Linear,
-    /// By polynomials of third degree, or limited gradients where none fits. Needs about 130 bytes
+    /// By polynomials of third degree, or a B-spline where none fits. Needs about 130 bytes
     /// for each point of the mesh.
     #[default]
     Cubic,

@@ -5,8 +5,8 @@ use crate::cutoff::Rgb;
 use crate::cutoff::painted::Stroke;
 use crate::optics::PlaneVector;
 use crate::scene::{CutoffSpec, TechniqueSpec};
+use crate::serve::deflection_map::DeflectionMap;
 use crate::serve::filter_plane::{as_painting, half_side_m, traced};
-use crate::serve::frame::DeflectionMap;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
