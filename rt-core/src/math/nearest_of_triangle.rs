@@ -18,8 +18,8 @@ pub struct NearestOfTriangle {
 ///
 /// ```
 /// use rt_core::{glam::DVec3, math::{NearestOfTriangle, nearest_of_triangle}};
-/// let triangle = [DVec3::new(-1.0, 0.0, 3.0), DVec3::new(1.0, 0.0, 3.0), DVec3::new(0.0, 5.0, 3.0)];
-/// let NearestOfTriangle { distance2, u, v } = nearest_of_triangle(triangle);
+/// let corners = [[-1.0, 0.0, 3.0], [1.0, 0.0, 3.0], [0.0, 5.0, 3.0]].map(DVec3::from);
+/// let NearestOfTriangle { distance2, u, v } = nearest_of_triangle(corners);
 /// assert_eq!([distance2, u, v], [9.0, 0.5, 0.0]);
 /// ```
 pub fn nearest_of_triangle(corners: [DVec3; 3]) -> NearestOfTriangle {

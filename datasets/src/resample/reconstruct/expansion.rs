@@ -34,8 +34,8 @@ const QUADRATIC_SHARE: f64 = 0.7;
 /// points may be anywhere between them.
 const UNRESOLVED: f64 = 2.0;
 
-/// How far a point's value goes to the spline's. With 1, the bow shock at the nose of a blunt fin is
-/// blurred by a cell (by 1.0 % of the range there, root mean square; 0.6 % with this, 0.3 % with
+/// How far a point's value goes to the spline's. With 1, the bow shock at the nose of a blunt fin
+/// is blurred by a cell (by 1.0 % of the range there, root mean square; 0.6 % with this, 0.3 % with
 /// 0). With 0, each cell along the shock shows far behind.
 const TO_SPLINE: f64 = 0.5;
 
