@@ -18,9 +18,9 @@ use std::time::Instant;
 pub(super) struct RenderArgs {
     /// The flow: VTK (.vti .vtr .vts .vtu, parallel, .pvd, .series, legacy, .vtkhdf), PLOT3D,
     /// NetCDF (.nc), XDMF, Exodus II, CGNS (.cgns), Tecplot (.tec .plt .dat), EnSight (.case),
-    /// NRRD, MetaImage, NumPy (.npy .npz), raw, a table of points (.csv .tsv .txt), or the folder of
-    /// an AMReX plotfile, of an OpenFOAM case or of one of its times. FILE/TIME is a time of a file
-    /// with several. Two-dimensional data need --span or --revolve
+    /// NRRD, MetaImage, NumPy (.npy .npz), raw, a table of points (.csv .tsv .txt), or the folder
+    /// of an AMReX plotfile, of an OpenFOAM case or of one of its times. FILE/TIME is a time of a
+    /// file with several. Two-dimensional data need --span or --revolve
     file: Option<PathBuf>,
     /// Image as PNG
     #[arg(long, short, value_name = "PNG")]
