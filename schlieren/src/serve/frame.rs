@@ -4,7 +4,7 @@ use super::deflection_map::DeflectionMap;
 use super::filter_plane::{FilterPlane, PIXELS};
 use super::legend::{self, Legend};
 use super::srgb_byte::srgb_byte;
-use crate::render::{Map, RenderOutput};
+use crate::render::RenderOutput;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::sync::Arc;
