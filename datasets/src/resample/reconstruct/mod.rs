@@ -10,9 +10,9 @@
 //! gradients) where the field is smooth.
 //!
 //! Where no polynomial fits, as at shocks, the mesh does not tell where in a cell the field
-//! changes. A cubic B-spline with the values as its coefficients takes the polynomial's place,
-//! half-way from the value of the point. It makes no new extrema, and shows no cells: a shock that
-//! crosses the lines of a grid obliquely has no stairs.
+//! changes. Slopes and curvature of a cubic B-spline with the values as its coefficients take the
+//! polynomial's place. They make hardly new extrema, and gradients have no steps at faces: a shock
+//! that crosses the lines of a grid obliquely has no stairs.
 //!
 //! Values of cells are taken as what solvers of finite volumes mean by them, averages over the
 //! cells: the averages of the polynomials are fitted to them ([`cell_moments`]).
