@@ -31,8 +31,8 @@ const RESIDUAL: [f64; 2] = [0.1, 0.25];
 const QUADRATIC_SHARE: f64 = 0.7;
 
 /// Where a polynomial gives way, the error is larger than what the spline adds: a step between two
-/// points may be anywhere between them. Twice is 107 times the error of a bell of four cells, which
-/// says nothing any more.
+/// points may be anywhere between them. Counted twice, it is 107 times the error of a bell three
+/// cells wide on hexahedra, which says nothing any more.
 const UNRESOLVED: f64 = 1.75;
 
 /// Number of samples of a spline: on a cubic grid, those that share a cell.

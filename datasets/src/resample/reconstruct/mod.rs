@@ -11,7 +11,7 @@
 //!
 //! Where no polynomial fits, as at shocks, the mesh does not tell where in a cell the field
 //! changes. Slopes and curvature of a cubic B-spline with the values as its coefficients take the
-//! polynomial's place. They make hardly new extrema, and gradients have no steps at faces: a shock
+//! polynomial's place. They hardly make new extrema, and gradients have no steps at faces: a shock
 //! that crosses the lines of a grid obliquely has no stairs.
 //!
 //! Values of cells are taken as what solvers of finite volumes mean by them, averages over the
