@@ -27,6 +27,7 @@ pub mod isosurface;
 pub mod model;
 pub mod read;
 pub mod resample;
+mod rows;
 pub mod stored_mesh;
 #[cfg(test)]
 mod testing;

@@ -27,6 +27,7 @@
 //! the points along its wall looks like gas. A cloud that is regular in one part and random in
 //! another is measured by what most of its cells are.
 
+use crate::rows::Rows;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -52,41 +53,12 @@ pub(crate) struct Gaps {
     pub(crate) cells: usize,
 }
 
-/// The cells around each point, one after the other.
-struct CellsOfPoints {
-    starts: Vec<usize>,
-    cells: Vec<u32>,
-}
-
-impl CellsOfPoints {
-    fn new<const N: usize>(corners: &[[u32; N]], points: usize) -> CellsOfPoints {
-        let mut starts = vec![0usize; points + 1];
-        corners.iter().flatten().for_each(|p| starts[*p as usize + 1] += 1);
-        for p in 0..points {
-            starts[p + 1] += starts[p];
-        }
-        let mut next = starts.clone();
-        let mut cells = vec![0; corners.len() * N];
-        for (c, corners) in corners.iter().enumerate() {
-            for p in corners {
-                cells[next[*p as usize]] = c as u32;
-                next[*p as usize] += 1;
-            }
-        }
-        CellsOfPoints { starts, cells }
-    }
-
-    fn of(&self, point: usize) -> &[u32] {
-        &self.cells[self.starts[point]..self.starts[point + 1]]
-    }
-}
-
 /// Finds the gaps among the cells of a Delaunay triangulation: triangles (`N` = 3) or tetrahedra.
 /// `spacings`: how many times as wide as the cells around it a gap is.
 pub(crate) fn find<const N: usize>(points: &[DVec3], corners: &[[u32; N]], spacings: f64) -> Gaps {
     let mut cloud = Cloud {
         corners,
-        around: CellsOfPoints::new(corners, points.len()),
+        around: Rows::inverse(corners.iter().map(|c| &c[..]), points.len()),
         sizes: corners.par_iter().map(|c| size(points, c)).collect(),
         is_gap: vec![false; corners.len()],
         own: vec![0.0; points.len()],
@@ -110,7 +82,7 @@ pub(crate) fn find<const N: usize>(points: &[DVec3], corners: &[[u32; N]], spaci
         let points = cloud.points_of(&found);
         cloud.measure(&points);
         let beside: Vec<u32> = points.par_iter().flat_map_iter(|p| cloud.neighbours(*p)).collect();
-        candidates = sorted(beside.iter().flat_map(|p| cloud.around.of(*p as usize)).copied());
+        candidates = sorted(beside.iter().flat_map(|p| cloud.around.row(*p as usize)).copied());
     }
     cloud.grow(GROWTH * threshold);
     cloud.close_small(LEAST_CELLS[usize::from(N > 3)]);
@@ -121,7 +93,8 @@ pub(crate) fn find<const N: usize>(points: &[DVec3], corners: &[[u32; N]], spaci
 /// A triangulation, and what is known of its gaps.
 struct Cloud<'a, const N: usize> {
     corners: &'a [[u32; N]],
-    around: CellsOfPoints,
+    /// The cells around each point.
+    around: Rows,
     sizes: Vec<f64>,
     is_gap: Vec<bool>,
     /// For each point, the size a third up among the cells around it that are no gaps.
@@ -159,7 +132,7 @@ impl<const N: usize> Cloud<'_, N> {
 
     /// The cells around a point that are no gaps.
     fn cells(&self, point: u32) -> impl Iterator<Item = u32> + '_ {
-        self.around.of(point as usize).iter().copied().filter(|c| !self.is_gap[*c as usize])
+        self.around.row(point as usize).iter().copied().filter(|c| !self.is_gap[*c as usize])
     }
 
     /// The corners of these cells, the point among them, once for each cell.
@@ -184,7 +157,7 @@ impl<const N: usize> Cloud<'_, N> {
                 let others = &self.corners[*other as usize];
                 corners.iter().enumerate().all(|(i, p)| i == skipped || others.contains(p))
             };
-            self.around.of(corners[(skipped + 1) % N] as usize).iter().copied().filter(shares)
+            self.around.row(corners[(skipped + 1) % N] as usize).iter().copied().filter(shares)
         })
     }
 

@@ -2,6 +2,7 @@
 
 use super::cell_moments::CellMoments;
 use crate::resample::mesh::Mesh;
+use crate::rows::Rows;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
@@ -11,18 +12,6 @@ pub(super) struct Incidence {
     same: Vec<u32>,
     corners: Rows,
     cells: Rows,
-}
-
-/// Lists one after the other.
-struct Rows {
-    starts: Vec<usize>,
-    values: Vec<u32>,
-}
-
-impl Rows {
-    fn row(&self, i: usize) -> &[u32] {
-        &self.values[self.starts[i]..self.starts[i + 1]]
-    }
 }
 
 impl Incidence {
@@ -35,29 +24,14 @@ impl Incidence {
         };
         // In pieces, because a list for each cell takes more memory than the rows.
         const PIECE: usize = 1 << 18;
-        let mut corners = Rows { starts: vec![0], values: vec![] };
+        let mut corners = Rows::new();
         for first in (0..mesh.num_cells()).step_by(PIECE) {
             let cells = first..mesh.num_cells().min(first + PIECE);
             let lists: Vec<Vec<u32>> = cells.into_par_iter().map(of_cell).collect();
-            for list in lists {
-                corners.values.extend(&list);
-                corners.starts.push(corners.values.len());
-            }
+            lists.iter().for_each(|list| corners.push(list));
         }
-        let mut starts = vec![0usize; mesh.num_points() + 1];
-        corners.values.iter().for_each(|&id| starts[id as usize + 1] += 1);
-        for i in 0..mesh.num_points() {
-            starts[i + 1] += starts[i];
-        }
-        let mut next = starts.clone();
-        let mut values = vec![0u32; corners.values.len()];
-        for cell in 0..mesh.num_cells() {
-            for &id in corners.row(cell) {
-                values[next[id as usize]] = cell as u32;
-                next[id as usize] += 1;
-            }
-        }
-        Incidence { same, corners, cells: Rows { starts, values } }
+        let cells = Rows::inverse(corners.iter(), mesh.num_points());
+        Incidence { same, corners, cells }
     }
 }
 
