@@ -129,23 +129,25 @@ void ReadMapper(vtkVolumeMapper* mapper, RtvVolumeFacts& facts)
   facts.vectors = (smart && smart->GetVectorMode() != off) || (blocks && blocks->GetVectorMode() != off) ? 1 : 0;
 }
 
-// The distance of the samples that OpenGL takes along a ray, in data units; 0 for mappers that take none in OpenGL, or that
-// move them by noise, whose mean is the integral.
-double SampleDistance(vtkVolumeMapper* mapper, vtkImageData* image, const uint32_t* dims, vtkMatrix4x4* matrix)
+// The distance of the samples that OpenGL takes along a ray, in data units; 0 for mappers that take
+// none in OpenGL, or that move them by noise, whose mean is the integral.
+double SampleDistance(
+  vtkVolumeMapper* mapper, vtkImageData* image, const uint32_t* dims, vtkMatrix4x4* matrix)
 {
   const double* spacing = image->GetSpacing();
   double least = 0.0, cells = 1.0;
   for (int axis = 0; axis < 3; ++axis)
   {
     const double* row = matrix->Element[axis];
-    const double world = spacing[axis] * std::sqrt(row[0] * row[0] + row[1] * row[1] + row[2] * row[2]);
+    const double world = spacing[axis] * std::hypot(row[0], row[1], row[2]);
     least = axis == 0 ? world : std::min(least, world);
     cells *= dims[axis] - 1.0;
   }
   // Half of the mean spacing, and less in grids of fewer than a million cells.
   const double mean = (spacing[0] + spacing[1] + spacing[2]) / 6.0;
   const double locked = mean * (0.01 + 0.99 * std::min(1.0, std::pow(cells, 0.333) / 100.0));
-  // Adjusted distances are the smallest spacing in the world. While the user turns the scene OpenGL may take longer steps.
+  // Adjusted distances are the smallest spacing in the world. While the user turns the scene OpenGL
+  // may take longer steps.
   if (auto gpu = vtkGPUVolumeRayCastMapper::SafeDownCast(mapper))
   {
     if (gpu->GetUseJittering())
@@ -153,7 +155,8 @@ double SampleDistance(vtkVolumeMapper* mapper, vtkImageData* image, const uint32
       return 0.0;
     }
     const double own = gpu->GetSampleDistance();
-    const bool asGiven = !gpu->GetLockSampleDistanceToInputSpacing() || std::abs(own / locked - 1.0) <= 0.001;
+    const bool locks = gpu->GetLockSampleDistanceToInputSpacing() != 0;
+    const bool asGiven = !locks || std::abs(own / locked - 1.0) <= 0.001;
     return gpu->GetAutoAdjustSampleDistances() ? least : asGiven ? own : locked;
   }
   if (auto smart = vtkSmartVolumeMapper::SafeDownCast(mapper))
@@ -164,7 +167,8 @@ double SampleDistance(vtkVolumeMapper* mapper, vtkImageData* image, const uint32
       return 0.0;
     }
 #endif
-    return !smart->GetInteractiveAdjustSampleDistances() && smart->GetAutoAdjustSampleDistances() ? least : locked;
+    const bool turns = smart->GetInteractiveAdjustSampleDistances() != 0;
+    return !turns && smart->GetAutoAdjustSampleDistances() ? least : locked;
   }
   return 0.0;
 }
@@ -376,5 +380,10 @@ const char* rtvAddVolume(RtvBridge* bridge, vtkVolume* volume, vtkRenderer* rend
     }
   }
   facts.has_data = 1;
-  return image ? AddGrid(bridge, mapper, volume, image, renderer->GetActiveCamera(), lights, name, facts) : rtvApi->check_volume(bridge, &facts);
+  if (!image)
+  {
+    return rtvApi->check_volume(bridge, &facts);
+  }
+  vtkCamera* camera = renderer->GetActiveCamera();
+  return AddGrid(bridge, mapper, volume, image, camera, lights, name, facts);
 }

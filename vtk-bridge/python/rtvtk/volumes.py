@@ -91,9 +91,10 @@ def _scalars_of(mapper, image, f):
 
 
 def _sample_distance(mapper, image, dims, matrix):
-    """The distance of the samples that OpenGL takes along a ray, in data units; 0 for mappers that take none in OpenGL, or that move
-    them by noise, whose mean is the integral."""
-    if any(mapper.IsA(kind) for kind in ("vtkGPUVolumeRayCastMapper", "vtkSmartVolumeMapper")) and mapper.GetUseJittering():
+    """The distance of the samples that OpenGL takes along a ray, in data units; 0 for mappers that
+    take none in OpenGL, or that move them by noise, whose mean is the integral."""
+    kinds = ("vtkGPUVolumeRayCastMapper", "vtkSmartVolumeMapper")
+    if any(mapper.IsA(kind) for kind in kinds) and mapper.GetUseJittering():
         return 0
     spacing = image.GetSpacing()
     # Half of the mean spacing, and less in grids of fewer than a million cells.
@@ -104,11 +105,16 @@ def _sample_distance(mapper, image, dims, matrix):
         if mapper.GetLockSampleDistanceToInputSpacing() and not 0.999 <= own / locked <= 1.001:
             own = locked
     elif mapper.IsA("vtkSmartVolumeMapper"):
-        adjusts, own = not mapper.GetInteractiveAdjustSampleDistances() and mapper.GetAutoAdjustSampleDistances(), locked
+        own = locked
+        adjusts = mapper.GetAutoAdjustSampleDistances()
+        adjusts = adjusts and not mapper.GetInteractiveAdjustSampleDistances()
     else:
         return 0
+    if not adjusts:
+        return own
     # The smallest spacing in the world. While the user turns the scene OpenGL may take longer steps.
-    return min(s * math.hypot(*(matrix.GetElement(i, j) for j in range(3))) for i, s in enumerate(spacing)) if adjusts else own
+    row = lambda i: math.hypot(*(matrix.GetElement(i, j) for j in range(3)))
+    return min(s * row(i) for i, s in enumerate(spacing))
 
 
 class Volumes:
