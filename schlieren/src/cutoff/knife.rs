@@ -79,15 +79,15 @@ impl Knife {
 
 /// A knife edge with a known source image.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Edge {
-    direction: [f32; 2],
-    edge_m: f32,
-    open: Open,
+pub(crate) struct Edge {
+    pub(crate) direction: [f32; 2],
+    pub(crate) edge_m: f32,
+    pub(crate) open: Open,
 }
 
 /// The open fraction of the source image, as a function of its centre's distance from the edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Open {
+pub(crate) enum Open {
     /// A point: all or nothing.
     Step,
     /// A slit parallel to the edge.

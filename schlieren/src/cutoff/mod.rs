@@ -13,7 +13,7 @@
 mod circle;
 mod color;
 mod image;
-mod knife;
+pub(crate) mod knife;
 pub mod painted;
 
 pub use circle::{Aperture, Passes};
@@ -72,7 +72,7 @@ pub struct CutoffPlane {
 
 /// The prepared cut-off. The trigonometry of knives is precomputed.
 #[derive(Debug, Clone, PartialEq)]
-enum Kind {
+pub(crate) enum Kind {
     Knife(knife::Edge),
     Other(Cutoff),
 }
@@ -85,6 +85,12 @@ impl CutoffPlane {
             other => Kind::Other(other.clone()),
         };
         CutoffPlane { kind, image }
+    }
+
+    /// The prepared cut-off.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn kind(&self) -> &Kind {
+        &self.kind
     }
 
     /// The undisturbed image of the source.

@@ -174,6 +174,12 @@ impl<const C: usize> Film<C> {
         &self.framing
     }
 
+    /// Whether it counts photons.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn has_counts(&self) -> bool {
+        self.count.is_some()
+    }
+
     /// Adds integer energy to a pixel. The sum of integers does not depend on their order.
     #[inline]
     pub(crate) fn add(&self, pixel: usize, energy: [u64; C], photons: u32) {

@@ -94,6 +94,16 @@ impl<'a> CpuFallback<'a> {
         self.repeated.load(Ordering::Relaxed)
     }
 
+    /// Notes the cause of a failure; the first one is the cause of all.
+    pub(super) fn set_cause(&self, error: &GpuError) {
+        let _ = self.cause.set(error.clone());
+    }
+
+    /// Notes rays that a replacement device traced again.
+    pub(super) fn add_repeated(&self, rays: u64) {
+        self.repeated.fetch_add(rays, Ordering::Relaxed);
+    }
+
     /// A warning with the first failure and the remedy.
     pub(super) fn device_warning(&self) -> Option<String> {
         let cause = self.cause.get()?;

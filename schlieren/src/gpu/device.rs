@@ -1,10 +1,11 @@
 //! Finds a GPU, opens it, and reopens it after a failure.
 
 use super::GpuError;
-use super::kernel::{FIRST_SLAB, Kernel};
+use super::kernel::FIRST_SLAB;
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError, mpsc};
+use std::time::Duration;
 use wgpu::{DeviceType, ErrorFilter};
 
 /// How often in a row a GPU is reopened after a failure. A batch that finishes between two failures
@@ -232,23 +233,120 @@ impl Gpu {
         }
     }
 
-    /// The compiled kernel. The first use compiles it.
-    pub(super) fn pipeline(&self, kernel: &Kernel) -> Result<wgpu::ComputePipeline, GpuError> {
-        let wgsl = kernel.wgsl();
+    /// A buffer, which is zero.
+    pub(super) fn buffer(&self, bytes: usize, usage: wgpu::BufferUsages) -> wgpu::Buffer {
+        self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: None,
+            size: bytes as u64,
+            usage,
+            mapped_at_creation: false,
+        })
+    }
+
+    /// Binds buffers to the two groups of a kernel.
+    pub(super) fn bind(
+        &self,
+        pipeline: &wgpu::ComputePipeline,
+        groups: [&[(u32, &wgpu::Buffer)]; 2],
+    ) -> Result<[wgpu::BindGroup; 2], GpuError> {
+        self.checked(|| {
+            [0, 1].map(|group| {
+                let entries: Vec<_> = groups[group]
+                    .iter()
+                    .map(|(binding, b)| wgpu::BindGroupEntry {
+                        binding: *binding,
+                        resource: b.as_entire_binding(),
+                    })
+                    .collect();
+                self.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                    label: None,
+                    layout: &pipeline.get_bind_group_layout(group as u32),
+                    entries: &entries,
+                })
+            })
+        })
+    }
+
+    /// Waits for a submission.
+    pub(super) fn wait(&self, index: wgpu::SubmissionIndex) -> Result<(), GpuError> {
+        let wait = wgpu::PollType::Wait { submission_index: Some(index), timeout: None };
+        if let Err(e) = self.device.poll(wait) {
+            self.mark_failed(e.to_string());
+        }
+        self.failure().map_or(Ok(()), |e| Err(self.failed(e)))
+    }
+
+    /// Waits until the callback of a buffer has run. Another thread's poll may have seen the work
+    /// complete and may not have run its callback yet, and a lost device may never run it.
+    pub(super) fn wait_for_map(
+        &self,
+        mapped: &mpsc::Receiver<Result<(), wgpu::BufferAsyncError>>,
+    ) -> Result<(), GpuError> {
+        const LOOK: Duration = Duration::from_millis(100);
+        let result = loop {
+            match mapped.recv_timeout(LOOK) {
+                Err(mpsc::RecvTimeoutError::Timeout) if self.failure().is_none() => {}
+                result => break result,
+            }
+        };
+        let failure = match result {
+            Ok(Ok(())) => None,
+            Ok(Err(e)) => Some(e.to_string()),
+            Err(e) => Some(e.to_string()),
+        };
+        if let Some(e) = failure {
+            self.mark_failed(e);
+        }
+        self.failure().map_or(Ok(()), |e| Err(self.failed(e)))
+    }
+
+    /// The words of a buffer that can be mapped, after all that was submitted.
+    pub(super) fn read(&self, buffer: &wgpu::Buffer) -> Result<Vec<u32>, GpuError> {
+        let (sender, mapped) = mpsc::channel();
+        buffer.map_async(wgpu::MapMode::Read, .., move |r| {
+            // The receiver is gone if the frame was abandoned.
+            let _ = sender.send(r);
+        });
+        self.wait_for_all()?;
+        self.wait_for_map(&mapped)?;
+        let words = {
+            let range = buffer.get_mapped_range(..).map_err(|e| {
+                self.mark_failed(e.to_string());
+                self.failed(e.to_string())
+            })?;
+            bytemuck::cast_slice(&range).to_vec()
+        };
+        buffer.unmap();
+        Ok(words)
+    }
+
+    fn wait_for_all(&self) -> Result<(), GpuError> {
+        if let Err(e) = self.device.poll(wgpu::PollType::wait_indefinitely()) {
+            self.mark_failed(e.to_string());
+        }
+        self.failure().map_or(Ok(()), |e| Err(self.failed(e)))
+    }
+
+    /// The compiled kernel with this source text. The first use compiles it.
+    pub(super) fn pipeline(
+        &self,
+        wgsl: String,
+        entry_point: &'static str,
+    ) -> Result<wgpu::ComputePipeline, GpuError> {
         let mut made = self.pipelines.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(p) = made.get(&wgsl) {
             return Ok(p.clone());
         }
         let pipeline = self.checked(|| {
             let module = self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
-                label: Some("march"),
+                label: Some(entry_point),
                 source: wgpu::ShaderSource::Wgsl(wgsl.as_str().into()),
             });
             self.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-                label: Some("march"),
+                label: Some(entry_point),
                 layout: None,
                 module: &module,
-                entry_point: Some("march"),
+                entry_point: Some(entry_point),
                 compilation_options: wgpu::PipelineCompilationOptions {
                     zero_initialize_workgroup_memory: false,
                     ..Default::default()

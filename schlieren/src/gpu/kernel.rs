@@ -30,8 +30,13 @@ impl Kernel {
         }
     }
 
-    /// The source text of the shader.
-    pub(super) fn wgsl(&self) -> String {
+    /// The source text of the shader that marches rays of the host.
+    pub(super) fn of_rays(&self) -> String {
+        self.march() + include_str!("rays.wgsl")
+    }
+
+    /// The source text of the march, without an entry point.
+    pub(super) fn march(&self) -> String {
         // Only the B-spline is accurate enough to need compensated sums, as on the CPU.
         let spline = self.interpolant == Interpolant::BSpline;
         let mut text = format!("const OPD = {};\nconst COMPENSATED = {spline};\n", self.opd);
@@ -111,7 +116,7 @@ mod tests {
     fn every_shader_is_valid_wgsl_for_every_device() {
         use naga::valid::{Capabilities, ValidationFlags, Validator};
         for kernel in all() {
-            let wgsl = kernel.wgsl();
+            let wgsl = kernel.of_rays();
             let mut validator = Validator::new(ValidationFlags::all(), Capabilities::empty());
             if let Err(e) = validator.validate(&parsed(&wgsl)) {
                 panic!("{kernel:?}: {}", e.emit_to_string(&wgsl));
@@ -123,7 +128,7 @@ mod tests {
     #[test]
     fn structures_have_the_sizes_that_are_written() {
         for kernel in all() {
-            let module = parsed(&kernel.wgsl());
+            let module = parsed(&kernel.of_rays());
             for (name, bytes) in [("Params", 96), ("Ray", 64), ("KernelOutput", 32)] {
                 let found = module.types.iter().find(|(_, t)| t.name.as_deref() == Some(name));
                 let naga::TypeInner::Struct { span, .. } = found.expect(name).1.inner else {
@@ -137,7 +142,7 @@ mod tests {
     #[test]
     fn what_is_not_wanted_is_not_bound() {
         for kernel in all() {
-            let module = parsed(&kernel.wgsl());
+            let module = parsed(&kernel.of_rays());
             let bound =
                 module.global_variables.iter().filter(|(_, v)| v.binding.is_some()).count() as u32;
             assert_eq!(bound, 3 + u32::from(kernel.nodes) + kernel.slabs, "{kernel:?}");

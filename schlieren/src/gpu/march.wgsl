@@ -1,8 +1,8 @@
-// Integrates deviations from straight rays by position Verlet, one ray per invocation. This is the
-// kernel of march/packet.rs in WGSL, with the same order of operations.
+// Integrates deviations from straight rays by position Verlet. This is the kernel of
+// march/packet.rs in WGSL, with the same order of operations.
 //
-// The host adds `const OPD`, `node_kind` (from nodes.wgsl, or a constant) and `sample` (from
-// trilinear.wgsl or bspline.wgsl).
+// The host adds `const OPD`, `node_kind` (from nodes.wgsl, or a constant), `sample` (from
+// trilinear.wgsl or bspline.wgsl), and an entry point: rays.wgsl, or those in frame/.
 
 struct Ray {
     // Midpoint of the undisturbed path through the field, in lattice coordinates.
@@ -50,8 +50,6 @@ struct Params {
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<storage, read> rays: array<Ray>;
-@group(0) @binding(2) var<storage, read_write> outputs: array<KernelOutput>;
 
 struct CellPosition {
     cell: vec3u,
@@ -75,13 +73,7 @@ fn rounded3(a: vec3f) -> vec3f {
     return bitcast<vec3f>(bitcast<vec3u>(a) ^ vec3u(params.zero));
 }
 
-@compute @workgroup_size(64)
-fn march(@builtin(global_invocation_id) id: vec3u) {
-    let i = id.x;
-    if i >= params.rays {
-        return;
-    }
-    let ray = rays[i];
+fn march_ray(ray: Ray) -> KernelOutput {
     var xi = ray.xi;
     var v = vec3f(0.0);
     var v_rest = vec3f(0.0);
@@ -89,8 +81,7 @@ fn march(@builtin(global_invocation_id) id: vec3u) {
     var opd_rest = 0.0;
     var worst_node = 0u;
     if ray.steps == 0u {
-        outputs[i] = KernelOutput(v, opd, vec3f(0.0), worst_node);
-        return;
+        return KernelOutput(v, opd, vec3f(0.0), worst_node);
     }
     // Step numbers are relative to the midpoint of the path, which makes them exact in f32.
     let middle = 0.5 * f32(ray.steps);
@@ -160,5 +151,5 @@ fn march(@builtin(global_invocation_id) id: vec3u) {
             xi = fma(vec3f(0.5 * dt), v, xi);
         }
     }
-    outputs[i] = KernelOutput(v, opd, xi, worst_node);
+    return KernelOutput(v, opd, xi, worst_node);
 }

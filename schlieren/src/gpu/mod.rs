@@ -13,6 +13,7 @@
 //! | kernel.rs, *.wgsl | the shader, assembled from what a scene needs |
 //! | volume.rs | the field on the device |
 //! | paths.rs | [`GpuPaths`]: traces starts to exits in batches |
+//! | frame/ | a whole frame on the device: starts, march, cut-off, film |
 //! | cpu_fallback.rs | recovery of batches that the device does not finish, on a reopened device or on the CPU |
 //!
 //! Line of sight, full marches and interpolated gradients have no kernel. They are refused by name
@@ -20,12 +21,17 @@
 
 mod cpu_fallback;
 mod device;
+mod frame;
 mod kernel;
 mod paths;
 mod volume;
+mod work;
 
 pub use device::Gpu;
-pub use paths::{GpuCounters, GpuOptions, GpuPaths};
+pub(crate) use frame::NotExposed;
+pub use paths::{GpuOptions, GpuPaths};
+pub use volume::VolumeCache;
+pub use work::GpuCounters;
 
 /// Why the GPU cannot trace.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -3,19 +3,19 @@
 use super::cpu_fallback::{BatchTracer, CpuFallback, Failure};
 use super::device::MAX_REOPENINGS;
 use super::kernel::{FIRST_SLAB, Kernel};
-use super::volume::Volume;
+use super::volume::{DeviceVolume, VolumeCache};
+use super::work::{GpuCounters, Work};
+
 use super::{Gpu, GpuError};
 use crate::field::Field;
 use crate::interpolate::{BSpline, Interpolant};
-use crate::march::{BlankCells, Frame, KernelOutput, KernelRay, Options};
+use crate::march::{BlankCells, FieldCache, Frame, KernelOutput, KernelRay, Options};
 use crate::path::{Exit, LightPaths, PathQuantities, Start};
 use crate::view::View;
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 use rayon::prelude::*;
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, mpsc};
-use std::time::Duration;
 use wgpu::{BufferDescriptor, BufferUsages};
 
 /// Number of rays per dispatch. This is enough to fill any device. It is small enough that two
@@ -45,21 +45,6 @@ impl Default for GpuOptions {
     }
 }
 
-/// Counts of the work so far.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct GpuCounters {
-    /// Number of rays traced.
-    pub rays: u64,
-    /// Number of steps submitted to the device for them.
-    pub ray_steps: u64,
-    /// Number of kernels started.
-    pub dispatches: u64,
-    /// Number of rays that were traced again on a reopened device.
-    pub rays_repeated: u64,
-    /// Number of rays that the CPU traced because the device failed.
-    pub rays_on_cpu: u64,
-}
-
 /// Traces light on a GPU through a field of weak index. Every call costs a round trip to the
 /// device, so [`LightPaths::trace_parallel`] with many starts is fastest.
 ///
@@ -70,27 +55,26 @@ pub struct GpuCounters {
 /// If a ray is stopped, its `status` is the cause, and deflection and displacement are those at the
 /// point where it stopped.
 pub struct GpuPaths<'a> {
-    field: &'a Field,
-    frame: Frame,
+    pub(super) field: &'a Field,
+    pub(super) frame: Frame,
     interpolant: Interpolant,
-    options: GpuOptions,
+    pub(super) options: GpuOptions,
     /// Number of rays per dispatch.
     batch: usize,
     current: Mutex<CurrentDevice>,
     /// Traces on the CPU when the device fails.
-    cpu_fallback_paths: CpuFallback<'a>,
-    rays: AtomicU64,
-    ray_steps: AtomicU64,
-    dispatches: AtomicU64,
+    pub(super) cpu_fallback_paths: CpuFallback<'a>,
+    pub(super) work: Work,
 }
 
 /// The field and the kernel on one device.
-struct DeviceState {
-    gpu: Arc<Gpu>,
+pub(super) struct DeviceState {
+    pub(super) gpu: Arc<Gpu>,
     /// Number of devices that preceded this one.
-    number: u32,
+    pub(super) number: u32,
+    pub(super) kernel: Kernel,
     pipeline: wgpu::ComputePipeline,
-    volume: Volume,
+    pub(super) volume: Arc<DeviceVolume>,
     /// Buffers that no batch is using.
     idle: Mutex<Vec<Scratch>>,
 }
@@ -106,19 +90,18 @@ impl DeviceState {
     fn new(
         gpu: Arc<Gpu>,
         number: u32,
-        field: &Field,
-        spline: Option<&BSpline>,
+        volume: Arc<DeviceVolume>,
         interpolant: Interpolant,
         options: GpuOptions,
     ) -> Result<DeviceState, GpuError> {
-        let volume = Volume::new(&gpu, field, spline)?;
-        let pipeline = gpu.pipeline(&Kernel {
+        let kernel = Kernel {
             interpolant,
             opd: options.quantities.opd,
             nodes: volume.kinds.is_some(),
             slabs: volume.slabs.len() as u32,
-        })?;
-        Ok(DeviceState { gpu, number, pipeline, volume, idle: Mutex::default() })
+        };
+        let pipeline = gpu.pipeline(kernel.of_rays(), "march")?;
+        Ok(DeviceState { gpu, number, kernel, pipeline, volume, idle: Mutex::default() })
     }
 
     fn failure(&self, error: GpuError) -> Failure {
@@ -196,7 +179,7 @@ struct RawKernelOutput {
 /// `Params` of march.wgsl.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
-struct Params {
+pub(super) struct Params {
     h2: [f32; 3],
     rays: u32,
     rcp_h2: [f32; 3],
@@ -242,14 +225,33 @@ impl<'a> GpuPaths<'a> {
         interpolant: Interpolant,
         options: GpuOptions,
     ) -> Result<GpuPaths<'a>, GpuError> {
+        let caches = (&FieldCache::default(), &VolumeCache::default());
+        GpuPaths::with_caches(gpu, field, view, interpolant, options, caches)
+    }
+
+    /// As [`GpuPaths::new`]. The spline, and what is copied to the device, are kept in `caches` for
+    /// other paths through the same field.
+    ///
+    /// # Errors
+    /// As [`GpuPaths::new`].
+    pub fn with_caches(
+        gpu: Arc<Gpu>,
+        field: &'a Field,
+        view: View,
+        interpolant: Interpolant,
+        options: GpuOptions,
+        caches: (&FieldCache, &VolumeCache),
+    ) -> Result<GpuPaths<'a>, GpuError> {
         if interpolant == Interpolant::TrilinearGradient {
             return Err(GpuError::Unsupported {
                 what: "the interpolant trilinear-gradient".into(),
                 cure: "Take one of them, or compute on the CPU (--device cpu).",
             });
         }
-        let spline = (interpolant == Interpolant::BSpline).then(|| BSpline::new(field));
-        let on_device = DeviceState::new(gpu, 0, field, spline.as_ref(), interpolant, options)?;
+        let (volume, bytes) = caches.1.volume(&gpu, field, interpolant, caches.0)?;
+        let work = Work::default();
+        work.add_to_device(bytes);
+        let on_device = DeviceState::new(gpu, 0, volume, interpolant, options)?;
         let GpuOptions { step_voxels, quantities, blank } = options;
         let on_cpu = Options { step_voxels, quantities, blank, ..Options::default() };
         Ok(GpuPaths {
@@ -260,21 +262,16 @@ impl<'a> GpuPaths<'a> {
             batch: BATCH,
             current: Mutex::new(CurrentDevice { on_device: Arc::new(on_device), attempts: 0 }),
             cpu_fallback_paths: CpuFallback::of_march(field, view, interpolant, on_cpu),
-            rays: AtomicU64::new(0),
-            ray_steps: AtomicU64::new(0),
-            dispatches: AtomicU64::new(0),
+            work,
         })
     }
 
     /// Counts of the work so far.
     pub fn counters(&self) -> GpuCounters {
-        let read = |c: &AtomicU64| c.load(Ordering::Relaxed);
         GpuCounters {
-            rays: read(&self.rays),
-            ray_steps: read(&self.ray_steps),
-            dispatches: read(&self.dispatches),
             rays_repeated: self.cpu_fallback_paths.repeated(),
             rays_on_cpu: self.cpu_fallback_paths.rays(),
+            ..self.work.counters()
         }
     }
 
@@ -289,7 +286,7 @@ impl<'a> GpuPaths<'a> {
         Arc::clone(&self.on_device().gpu)
     }
 
-    fn on_device(&self) -> Arc<DeviceState> {
+    pub(super) fn on_device(&self) -> Arc<DeviceState> {
         Arc::clone(&self.current.lock().unwrap_or_else(PoisonError::into_inner).on_device)
     }
 
@@ -303,7 +300,7 @@ impl<'a> GpuPaths<'a> {
         self.on_device().volume.slabs.len()
     }
 
-    fn params(&self, volume: &Volume, rays: usize) -> Params {
+    pub(super) fn params(&self, volume: &DeviceVolume, rays: usize) -> Params {
         let h = (self.frame.spacing_m / self.frame.unit_m).to_array();
         let dims = self.field.dims();
         Params {
@@ -393,8 +390,10 @@ impl BatchTracer for GpuPaths<'_> {
             let _ = sender.send(r);
         });
         let steps: u64 = rays.iter().map(|r| u64::from(r.steps)).sum();
-        self.ray_steps.fetch_add(steps, Ordering::Relaxed);
-        self.dispatches.fetch_add(1, Ordering::Relaxed);
+        self.work.add_steps(steps);
+        self.work.add_submission(1);
+        self.work.add_to_device((size_of::<Params>() + size_of_val(&rays[..])) as u64);
+        self.work.add_from_device(bytes);
         Ok(Pending { on_device, scratch, prepared, index, mapped })
     }
 
@@ -406,21 +405,8 @@ impl BatchTracer for GpuPaths<'_> {
             on_device
                 .failure(gpu.failed(gpu.failure().map_or_else(|| e.to_string(), str::to_string)))
         };
-        let wait = wgpu::PollType::Wait { submission_index: Some(pending.index), timeout: None };
-        gpu.device.poll(wait).map_err(|e| failed(&e))?;
-        // Another thread's poll may have seen this batch complete and may not have run its callback
-        // yet, so wait for the callback as well. A lost device may never run it.
-        const LOOK: Duration = Duration::from_millis(100);
-        let mapped = loop {
-            match pending.mapped.recv_timeout(LOOK) {
-                Err(mpsc::RecvTimeoutError::Timeout) if gpu.failure().is_none() => {}
-                result => break result,
-            }
-        };
-        mapped.map_err(|e| failed(&e))?.map_err(|e| failed(&e))?;
-        if let Some(e) = gpu.failure() {
-            return Err(on_device.failure(gpu.failed(e)));
-        }
+        gpu.wait(pending.index).map_err(|e| on_device.failure(e))?;
+        gpu.wait_for_map(&pending.mapped).map_err(|e| on_device.failure(e))?;
         let bytes = (exits.len() * size_of::<RawKernelOutput>()) as u64;
         {
             let range =
@@ -447,6 +433,13 @@ impl BatchTracer for GpuPaths<'_> {
     }
 
     fn replace(&self, failed: &Failure) -> Result<(), GpuError> {
+        self.replace_device(failed)
+    }
+}
+
+impl GpuPaths<'_> {
+    /// Replaces the failed device: [`BatchTracer::replace`].
+    pub(super) fn replace_device(&self, failed: &Failure) -> Result<(), GpuError> {
         // A thread that waits for this lock takes no other jobs. Nothing below may therefore wait
         // for a job, so the spline is built on this thread alone.
         let mut current = self.current.lock().unwrap_or_else(PoisonError::into_inner);
@@ -467,14 +460,9 @@ impl BatchTracer for GpuPaths<'_> {
         let spline =
             (self.interpolant == Interpolant::BSpline).then(|| BSpline::on_this_thread(self.field));
         let number = failed.device + 1;
-        let made = DeviceState::new(
-            gpu,
-            number,
-            self.field,
-            spline.as_ref(),
-            self.interpolant,
-            self.options,
-        )?;
+        let volume = Arc::new(DeviceVolume::new(&gpu, self.field, spline.as_ref())?);
+        self.work.add_to_device(volume.bytes);
+        let made = DeviceState::new(gpu, number, volume, self.interpolant, self.options)?;
         current.on_device = Arc::new(made);
         Ok(())
     }
@@ -482,7 +470,7 @@ impl BatchTracer for GpuPaths<'_> {
 
 impl LightPaths for GpuPaths<'_> {
     fn trace(&self, starts: &[Start], exits: &mut [Exit]) {
-        self.rays.fetch_add(starts.len() as u64, Ordering::Relaxed);
+        self.work.add_rays(starts.len() as u64);
         self.cpu_fallback_paths.trace(self, self.batch, starts, exits, false);
     }
 
@@ -507,7 +495,7 @@ impl LightPaths for GpuPaths<'_> {
     }
 
     fn trace_parallel(&self, starts: &[Start], exits: &mut [Exit]) {
-        self.rays.fetch_add(starts.len() as u64, Ordering::Relaxed);
+        self.work.add_rays(starts.len() as u64);
         self.cpu_fallback_paths.trace(self, self.batch, starts, exits, true);
     }
 }

@@ -5,14 +5,57 @@ use super::kernel::Kernel;
 use super::{Gpu, GpuError};
 use crate::field::Field;
 use crate::interpolate::{BSpline, Interpolant};
+use crate::march::FieldCache;
+use std::sync::{Arc, Mutex, PoisonError};
 use wgpu::{BufferDescriptor, BufferUsages};
 
 /// Bytes per upload. A larger upload would be copied to staging memory as a whole before its
 /// transfer begins.
 const UPLOAD_BYTES: usize = 64 << 20;
 
+/// Keeps a field on the device for the next image of it. The owner must pass the same field to
+/// every call.
+#[derive(Default)]
+pub struct VolumeCache {
+    kept: Mutex<Option<Kept>>,
+}
+
+struct Kept {
+    gpu: Arc<Gpu>,
+    interpolant: Interpolant,
+    volume: Arc<DeviceVolume>,
+}
+
+impl VolumeCache {
+    /// The field on a device, and the number of bytes that were copied there for it. The newest is
+    /// kept.
+    ///
+    /// # Errors
+    /// If it does not fit, or the device fails.
+    pub(super) fn volume(
+        &self,
+        gpu: &Arc<Gpu>,
+        field: &Field,
+        interpolant: Interpolant,
+        cache: &FieldCache,
+    ) -> Result<(Arc<DeviceVolume>, u64), GpuError> {
+        let lock = || self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        let is_this = |k: &&Kept| Arc::ptr_eq(&k.gpu, gpu) && k.interpolant == interpolant;
+        if let Some(kept) = lock().as_ref().filter(is_this) {
+            return Ok((Arc::clone(&kept.volume), 0));
+        }
+        // No lock is held meanwhile: all threads take part in the spline.
+        let spline = (interpolant == Interpolant::BSpline).then(|| cache.spline(field));
+        let volume = Arc::new(DeviceVolume::new(gpu, field, spline.as_deref())?);
+        let (gpu, kept) = (Arc::clone(gpu), Arc::clone(&volume));
+        *lock() = Some(Kept { gpu, interpolant, volume: kept });
+        let bytes = volume.bytes;
+        Ok((volume, bytes))
+    }
+}
+
 /// A field on the device.
-pub(super) struct Volume {
+pub(super) struct DeviceVolume {
     /// Slabs along z. Neighbouring slabs share the layers that cells at their border need.
     pub(super) slabs: Vec<wgpu::Buffer>,
     /// Kinds of the nodes, two bits each, if not all are gas.
@@ -25,13 +68,13 @@ pub(super) struct Volume {
     pub(super) bytes: u64,
 }
 
-impl Volume {
+impl DeviceVolume {
     /// Uploads the field, or the spline through it.
     pub(super) fn new(
         gpu: &Gpu,
         field: &Field,
         spline: Option<&BSpline>,
-    ) -> Result<Volume, GpuError> {
+    ) -> Result<DeviceVolume, GpuError> {
         let [nx, ny, nz] = field.dims();
         let (values, stride) = spline.map_or((field.eps(), [nx, nx * ny]), BSpline::coefficients);
         let halo = Kernel::halo(if spline.is_some() {
@@ -71,7 +114,7 @@ impl Volume {
             .collect::<Result<Vec<_>, _>>()?;
         let kinds = words.map(|w| upload(gpu, bytemuck::cast_slice(&w))).transpose()?;
         let bytes = slabs.iter().chain(&kinds).map(wgpu::Buffer::size).sum();
-        Ok(Volume { slabs, kinds, stride, layers, bytes })
+        Ok(DeviceVolume { slabs, kinds, stride, layers, bytes })
     }
 }
 

@@ -35,7 +35,7 @@ pub(crate) struct Frame {
     pub(crate) spacing_m: DVec3,
     pub(crate) last: DVec3,
     /// The view's centre in lattice coordinates.
-    centre: DVec3,
+    pub(crate) centre: DVec3,
     /// Length unit of the kernels: a power of two near the largest spacing, so that fields of any
     /// size use numbers of the same magnitude.
     pub(crate) unit_m: f64,

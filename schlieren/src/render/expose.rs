@@ -1,12 +1,13 @@
 //! Exposes a film to the light of every spectral line through the test section, and filters the
 //! noise.
 
+use super::on_gpu::{self, FilmControl};
 use super::paths::Accuracy;
 use super::{
     Control, Layers, PlannedPaths, RenderError, RenderOutput, Report, TestSection, technique,
 };
 use crate::film::beams::expose_beams;
-use crate::film::photons::{Exposure, LandedPhoton, expose};
+use crate::film::photons::{ExposedFilm, Exposure, LandedPhoton, expose};
 use crate::film::{Film, Framing};
 use crate::filter::Filter;
 use crate::optics::{Optics, SourceImage};
@@ -101,14 +102,13 @@ pub(super) fn expose_lines<'a>(
             ..layers
         };
         let (scale, before) = (scene.exposure() as f32, r.report.counters.rays);
+        let light = Light { planned: &planned, setup, layers: line_layers };
         if t.is_colored() {
-            let film =
-                expose_line::<3>(scene, &setup, framing, line_layers, control.cancel, &part, r)?;
+            let film = expose_line::<3>(scene, &light, framing, control.cancel, &part, r)?;
             r.colored = true;
             r.pixels = film.into_iter().map(|p| p.map(|v| v * scale)).collect();
         } else {
-            let film =
-                expose_line::<1>(scene, &setup, framing, line_layers, control.cancel, &part, r)?;
+            let film = expose_line::<1>(scene, &light, framing, control.cancel, &part, r)?;
             let color = if lines.len() > 1 { colors[line] } else { [1.0; 3] };
             for (p, f) in r.pixels.iter_mut().zip(film) {
                 (0..3).for_each(|c| p[c] += f[0] * color[c] * scale);
@@ -125,21 +125,29 @@ pub(super) fn expose_lines<'a>(
         counters.dispersion_rays += if line > 0 { rays } else { 0 };
         counters.media_rays += planned.take_media_rays();
         r.report.add_cells(&planned);
+        r.report.add_device(&planned);
         first.get_or_insert(planned);
     }
     Ok(first)
 }
 
+/// The light of one line, and the layers that are wanted of it.
+struct Light<'a, 'b> {
+    planned: &'a PlannedPaths<'b>,
+    setup: Exposure<'a>,
+    layers: Layers,
+}
+
 /// The filtered film of one line: energy per pixel.
 fn expose_line<const C: usize>(
     scene: &Scene,
-    setup: &Exposure<'_>,
+    light: &Light<'_, '_>,
     framing: Framing,
-    layers: Layers,
     cancel: &AtomicBool,
     progress: &(dyn Fn(f64) + Sync),
     r: &mut RenderOutput,
 ) -> Result<Vec<[f32; C]>, RenderError> {
+    let Light { planned, ref setup, layers } = *light;
     let done = AtomicU64::new(0);
     let side = |n: u32| u64::from(n) + 2 * u64::from(setup.margin_px);
     let per_pass = side(framing.width) * side(framing.height);
@@ -151,8 +159,21 @@ fn expose_line<const C: usize>(
         SamplingSpec::Beams { cells_per_side } => {
             let total = per_pass * u64::from(cells_per_side).pow(2);
             let film = Film::<C>::new(framing, false);
-            let tally = expose_beams(setup, &film, cells_per_side, cancel, &|n| finished(total, n))
-                .ok_or(RenderError::Cancelled)?;
+            let progress = |n| finished(total, n);
+            let control = FilmControl { cancel, progress: &progress };
+            let by_gpu = on_gpu::expose_beams(
+                planned,
+                setup,
+                &film,
+                cells_per_side,
+                &control,
+                &mut r.report,
+            )?;
+            let tally = match by_gpu {
+                Some(tally) => tally,
+                None => expose_beams(setup, &film, cells_per_side, cancel, &progress)
+                    .ok_or(RenderError::Cancelled)?,
+            };
             r.report.tally.add(&tally);
             let rays = done.load(Ordering::Relaxed);
             r.report.counters.differential_rays += rays;
@@ -171,8 +192,27 @@ fn expose_line<const C: usize>(
             let two = layers.noise && samples > 1;
             let films: Vec<Film<C>> =
                 (0..if two { 2 } else { 1 }).map(|_| Film::new(framing, layers.counts)).collect();
-            let exposed = expose(setup, &films, 0..samples, keep, cancel, &|n| finished(total, n))
-                .ok_or(RenderError::Cancelled)?;
+            let progress = |n| finished(total, n);
+            let control = FilmControl { cancel, progress: &progress };
+            let by_gpu = match keep {
+                true => {
+                    on_gpu::warn_of_cone_filter(planned, &mut r.report);
+                    None
+                }
+                false => on_gpu::expose_photons(
+                    planned,
+                    setup,
+                    &films,
+                    samples,
+                    &control,
+                    &mut r.report,
+                )?,
+            };
+            let exposed = match by_gpu {
+                Some(tally) => ExposedFilm { tally, landed: Vec::new() },
+                None => expose(setup, &films, 0..samples, keep, cancel, &progress)
+                    .ok_or(RenderError::Cancelled)?,
+            };
             r.report.tally.add(&exposed.tally);
             r.report.counters.rays += exposed.tally.sent - exposed.tally.blocked_by_solids;
             r.report.counters.solid_queries +=

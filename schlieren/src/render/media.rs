@@ -66,6 +66,9 @@ impl TestSection {
         let integrator = self.media_integrator(media, line, view, &planned, &wanted);
         let (analyser, rays) = (scene.media.analyser_rad(), Arc::clone(&planned.media_rays));
         planned.paths = Box::new(AttenuatedPaths::new(planned.paths, integrator, analyser, rays));
+        // The device does not know what dims the light.
+        #[cfg(feature = "gpu")]
+        (planned.on_device = None);
         Ok(planned)
     }
 

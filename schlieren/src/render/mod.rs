@@ -23,6 +23,7 @@
 
 mod accuracy_warning;
 mod apparent;
+mod device_work;
 mod expose;
 pub(crate) mod map;
 mod media;
@@ -37,6 +38,7 @@ mod section;
 mod tests;
 
 pub(crate) use apparent::displacements as apparent_displacements;
+pub use device_work::DeviceWork;
 pub use map::Map;
 pub use media::MediaMap;
 pub use on_gpu::check_gpu;
@@ -220,6 +222,9 @@ pub struct Report {
     /// The work on the cells of a mesh, for the first wavelength and the map; `None` on a lattice.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cells: Option<CellCounters>,
+    /// The work of the GPU, if one took part.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub device: Option<DeviceWork>,
     /// Lowest and highest channel value of the image.
     pub levels: [f32; 2],
     /// Width of the margin around the image, in pixels, that also sent light.
@@ -242,6 +247,16 @@ impl Report {
         if let (None, Some(work)) = (self.cells, &planned.cell_work) {
             self.cells = Some(work.counters());
         }
+    }
+
+    /// Notes the work of a GPU.
+    fn add_device(&mut self, planned: &PlannedPaths<'_>) {
+        #[cfg(feature = "gpu")]
+        if let Some(paths) = &planned.on_device {
+            self.device.get_or_insert_default().add(&paths.counters());
+        }
+        #[cfg(not(feature = "gpu"))]
+        let _ = planned;
     }
 
     pub(crate) fn add_plan(&mut self, planned: &PlannedPaths<'_>) {

@@ -1,14 +1,17 @@
 //! Plans light paths on the GPU, or gives the reason why the CPU computes them.
 
-use super::RenderError;
 use super::planned::PlannedPaths;
 #[cfg(feature = "gpu")]
 use super::planned::{Choice, described};
+use super::section::Caches;
+use super::{RenderError, Report};
 use crate::field::Field;
-use crate::march::FieldCache;
+use crate::film::photons::Exposure;
+use crate::film::{Film, Tally};
 use crate::plan::Request;
 use crate::scene::{Device, MarchSpec};
 use crate::view::View;
+use std::sync::atomic::AtomicBool;
 
 /// Checks whether a scene's march can be computed on this machine's GPU, whatever the flow is, if
 /// the scene requests a GPU. Opens the GPU.
@@ -65,7 +68,7 @@ pub(super) fn on_gpu<'a>(
     view: View,
     request: Request,
     measured_rays: Option<usize>,
-    cache: &FieldCache,
+    caches: &Caches,
 ) -> Result<Result<PlannedPaths<'a>, Option<String>>, RenderError> {
     use crate::gpu::{Gpu, GpuError, GpuOptions, GpuPaths};
     use crate::plan::{Mode, Plan};
@@ -74,6 +77,7 @@ pub(super) fn on_gpu<'a>(
     if march.device == Device::Cpu {
         return Ok(Err(None));
     }
+    let cache = &caches.field;
     let mut plan = Plan::from_derivative_bounds(field, request, cache.derivative_bounds(field));
     if plan.mode == Mode::LineOfSight && request.mode.is_none() {
         if march.device == Device::Auto {
@@ -124,7 +128,9 @@ pub(super) fn on_gpu<'a>(
         // of times.
         let mut warning = None;
         let paths = loop {
-            match GpuPaths::new(Arc::clone(&gpu), field, view, plan.interpolant, options) {
+            let on = Arc::clone(&gpu);
+            let kept = (cache, &caches.device);
+            match GpuPaths::with_caches(on, field, view, plan.interpolant, options, kept) {
                 Err(e @ GpuError::Failed { .. }) if gpu.failure().is_some() => {
                     warning.get_or_insert(format!(
                         "{}; it was reopened",
@@ -140,14 +146,16 @@ pub(super) fn on_gpu<'a>(
     match made {
         Ok((paths, gpu, warning, plan, achieved)) => {
             let description = described("verlet", plan.interpolant, plan.step_voxels);
+            let paths = Arc::new(paths);
             let mut planned = PlannedPaths::new(
-                Box::new(paths),
+                Box::new(Arc::clone(&paths)),
                 format!("{description}, on {}", gpu.name()),
                 achieved,
                 &request,
                 (Mode::Paraxial.into(), plan.step_voxels),
             );
             planned.choice = Some(Choice::Lattice(plan));
+            planned.on_device = Some(paths);
             if request.mode.is_none()
                 && achieved.is_some_and(|a| {
                     a.max_rad > request.tolerance_rad && a.resolution_rad <= request.tolerance_rad
@@ -165,6 +173,88 @@ pub(super) fn on_gpu<'a>(
     }
 }
 
+/// Exposes films by photons where the paths are, if that is a GPU that can: `Ok(None)` where the CPU
+/// must. A warning says why the GPU cannot.
+pub(super) fn expose_photons<const C: usize>(
+    planned: &PlannedPaths<'_>,
+    setup: &Exposure<'_>,
+    films: &[Film<C>],
+    samples: u32,
+    control: &FilmControl<'_>,
+    report: &mut Report,
+) -> Result<Option<Tally>, RenderError> {
+    #[cfg(feature = "gpu")]
+    if let Some(device) = &planned.on_device {
+        let FilmControl { cancel, progress } = *control;
+        return exposed(device.expose_photons(setup, films, 0..samples, cancel, progress), report);
+    }
+    let _ = (planned, setup, films, samples, control, report);
+    Ok(None)
+}
+
+/// As [`expose_photons`], by beams.
+pub(super) fn expose_beams<const C: usize>(
+    planned: &PlannedPaths<'_>,
+    setup: &Exposure<'_>,
+    film: &Film<C>,
+    per_side: u32,
+    control: &FilmControl<'_>,
+    report: &mut Report,
+) -> Result<Option<Tally>, RenderError> {
+    #[cfg(feature = "gpu")]
+    if let Some(device) = &planned.on_device {
+        let FilmControl { cancel, progress } = *control;
+        return exposed(device.expose_beams(setup, film, per_side, cancel, progress), report);
+    }
+    let _ = (planned, setup, film, per_side, control, report);
+    Ok(None)
+}
+
+/// Cancels an exposure and reports its progress.
+#[derive(Clone, Copy)]
+#[cfg_attr(not(feature = "gpu"), expect(dead_code, reason = "nothing else exposes elsewhere"))]
+pub(super) struct FilmControl<'a> {
+    pub(super) cancel: &'a AtomicBool,
+    /// Receives numbers of traced rays.
+    pub(super) progress: &'a (dyn Fn(u64) + Sync),
+}
+
+#[cfg(feature = "gpu")]
+fn exposed(
+    result: Result<Tally, crate::gpu::NotExposed>,
+    report: &mut Report,
+) -> Result<Option<Tally>, RenderError> {
+    use crate::gpu::NotExposed;
+    match result {
+        Ok(tally) => Ok(Some(tally)),
+        Err(NotExposed::Cancelled) => Err(RenderError::Cancelled),
+        Err(NotExposed::Refused(why)) => {
+            let warning = film_on_cpu(&why);
+            if !report.warnings.contains(&warning) {
+                report.warnings.push(warning);
+            }
+            Ok(None)
+        }
+    }
+}
+
+/// Warns that a cone filter needs every photon, which stay on the device otherwise.
+pub(super) fn warn_of_cone_filter(planned: &PlannedPaths<'_>, report: &mut Report) {
+    #[cfg(feature = "gpu")]
+    if planned.on_device.is_some() {
+        let refused = crate::gpu::NotExposed::Refused("the cone filter keeps every photon".into());
+        // A refusal is no error.
+        let _ = exposed(Err(refused), report);
+    }
+    let _ = (planned, report);
+}
+
+/// The warning that only the march is on the GPU.
+#[cfg(feature = "gpu")]
+fn film_on_cpu(why: &str) -> String {
+    format!("the GPU bends the light, and the CPU sends it and exposes the film: {why}")
+}
+
 /// Without the feature `gpu` there is no march on the GPU.
 #[cfg(not(feature = "gpu"))]
 pub(super) fn on_gpu<'a>(
@@ -173,7 +263,7 @@ pub(super) fn on_gpu<'a>(
     _: View,
     _: Request,
     _: Option<usize>,
-    _: &FieldCache,
+    _: &Caches,
 ) -> Result<Result<PlannedPaths<'a>, Option<String>>, RenderError> {
     match march.device {
         Device::Cpu => Ok(Err(None)),

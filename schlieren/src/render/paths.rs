@@ -5,12 +5,13 @@
 use super::on_cells::{self, Steps};
 use super::on_gpu::on_gpu;
 use super::planned::{Choice, PlannedPaths, described};
+use super::section::Caches;
 use super::{RenderError, TestSection};
 use crate::field::Field;
 use crate::interpolate::{BSpline, Interpolant, Interpolate, Trilinear, TrilinearGradient};
 use crate::march::{
-    BlankCells, Deviational, FieldCache, Full, FullOptions, Integrator, Options, Pefrl,
-    RungeKutta4, Scheme, Sharma,
+    BlankCells, Deviational, Full, FullOptions, Integrator, Options, Pefrl, RungeKutta4, Scheme,
+    Sharma,
 };
 use crate::media::Bend;
 use crate::path::{Exit, LightPaths, PathQuantities, Start};
@@ -110,8 +111,9 @@ impl TestSection {
                 _ => Interpolant::BSpline,
             });
         let field = &self.fields[line];
-        let temporary = FieldCache::default();
-        let cache = self.caches.get(line).unwrap_or(&temporary);
+        let temporary = Caches::default();
+        let caches = self.caches.get(line).unwrap_or(&temporary);
+        let cache = &caches.field;
         let with = |mode| Request {
             tolerance_rad: march.tolerance_rad,
             direction: Some(view.forward),
@@ -142,7 +144,7 @@ impl TestSection {
             _ => Mode::Full,
         });
         let planned =
-            on_gpu(march, field, view, with(mode), measure.then_some(MEASURED_RAYS), cache)?;
+            on_gpu(march, field, view, with(mode), measure.then_some(MEASURED_RAYS), caches)?;
         let why_not = match planned {
             Ok(mut planned) => {
                 if !scene.media.attenuating().is_empty() {

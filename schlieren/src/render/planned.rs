@@ -44,6 +44,9 @@ pub struct PlannedPaths<'a> {
     pub(super) choice: Option<Choice>,
     /// The work on the cells of a mesh; `None` on a lattice.
     pub(super) cell_work: Option<Arc<CellWork>>,
+    /// The same paths, if the whole frame can be computed where they are.
+    #[cfg(feature = "gpu")]
+    pub(super) on_device: Option<Arc<crate::gpu::GpuPaths<'a>>>,
 }
 
 impl<'a> PlannedPaths<'a> {
@@ -67,6 +70,8 @@ impl<'a> PlannedPaths<'a> {
             media_rays: Arc::default(),
             choice: None,
             cell_work: None,
+            #[cfg(feature = "gpu")]
+            on_device: None,
         }
     }
 

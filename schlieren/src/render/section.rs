@@ -32,7 +32,15 @@ pub struct TestSection {
     /// Warnings about what was repaired or left out, one sentence each.
     pub warnings: Vec<String>,
     /// Results that marches compute from each field, when they are kept.
-    pub(super) caches: Vec<FieldCache>,
+    pub(super) caches: Vec<Caches>,
+}
+
+/// What marches compute from a field, and what they copy to a device.
+#[derive(Default)]
+pub(super) struct Caches {
+    pub(super) field: FieldCache,
+    #[cfg(feature = "gpu")]
+    pub(super) device: crate::gpu::VolumeCache,
 }
 
 /// Refuses scenes that need a lattice and have none, before anything looks for it.
@@ -173,12 +181,13 @@ impl TestSection {
         Ok(TestSection { fields, cells, view, solids, media: None, input, warnings, caches })
     }
 
-    /// Keeps what marches compute from the fields (splines, projections) for further images. This
+    /// Keeps what marches compute from the fields (splines, projections), and the fields on a GPU, for
+    /// further images. This
     /// takes as much memory as the fields again, and a second image then takes only the time of its
     /// light. Fields must not be replaced after this.
     #[must_use]
     pub fn with_caches(mut self) -> TestSection {
-        self.caches = self.fields.iter().map(|_| FieldCache::default()).collect();
+        self.caches = self.fields.iter().map(|_| Caches::default()).collect();
         self
     }
 

@@ -21,7 +21,7 @@ use rt_core::math::mix64;
 #[derive(Debug, Clone, Copy)]
 pub struct Bos {
     pub(super) optics: Optics,
-    dots: Dots,
+    pub(crate) dots: Dots,
 }
 
 /// A background of random dots.

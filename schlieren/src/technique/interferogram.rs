@@ -16,10 +16,10 @@ use crate::optics::Optics;
 #[derive(Debug, Clone, Copy)]
 pub struct Interferogram {
     pub(super) optics: Optics,
-    waves_per_m: f64,
-    visibility: f32,
+    pub(crate) waves_per_m: f64,
+    pub(crate) visibility: f32,
     /// Fringes per metre along right and up; zero for the infinite fringe.
-    carrier_per_m: [f64; 2],
+    pub(crate) carrier_per_m: [f64; 2],
     n0: f32,
 }
 

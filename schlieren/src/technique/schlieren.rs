@@ -32,8 +32,20 @@ impl Schlieren {
         Schlieren { band: Some(band), ..self }
     }
 
-    pub(super) fn samples_the_source(&self) -> bool {
+    pub(crate) fn samples_the_source(&self) -> bool {
         self.sampled
+    }
+
+    /// The cut-off plane.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn plane(&self) -> &CutoffPlane {
+        &self.plane
+    }
+
+    /// What this light's wavelength contributes to each channel of the filter.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn band(&self) -> Option<Rgb> {
+        self.band
     }
 
     pub(super) fn is_colored(&self) -> bool {

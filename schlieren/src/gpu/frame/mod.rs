@@ -1,0 +1,424 @@
+//! Exposes a film on the device: only its sums come back.
+//!
+//! A photon's start, its way through the field, the cut-off and the film are one invocation of one
+//! shader. Beams take two: one for the corners of cells and one for their areas. The shader does
+//! what the CPU does, with the host's `f64` replaced by numbers of 48 bits where rays start, and by
+//! `f32` behind the flow. Sums on the film are integers, so a frame has the same bits in every run.
+//!
+//! | file | contents |
+//! |---|---|
+//! | params.rs, frame.wgsl | the numbers of a frame |
+//! | double.wgsl, sampler.wgsl | numbers of 48 bits; sample points |
+//! | start.wgsl, exit.wgsl | a photon's ray, and what it brings to the film |
+//! | technique.rs, technique/*.wgsl | its energy, by technique and cut-off |
+//! | photons.wgsl, corners.wgsl, triangles.wgsl | entry points |
+//! | film.rs, film.wgsl | the sums |
+//! | shader.rs | the shaders, assembled from what a scene needs |
+
+mod film;
+mod params;
+mod shader;
+mod technique;
+
+use super::cpu_fallback::Failure;
+use super::kernel::FIRST_SLAB;
+use super::paths::DeviceState;
+use super::{GpuError, GpuPaths};
+use crate::film::photons::Exposure;
+use crate::film::{Film, Framing, Tally};
+use film::{FilmLayout, add_to_films};
+use params::FrameParams;
+use shader::FrameShader;
+use std::collections::VecDeque;
+use std::ops::Range;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use technique::TechniqueShader;
+use wgpu::BufferUsages;
+
+/// Number of photons or corners in a submission: enough to fill any device, and few enough that no
+/// driver assumes that the device hangs.
+const PER_SUBMISSION: usize = 1 << 18;
+/// Pixels of a tile, which is a work group.
+const TILE: usize = 64;
+/// Side of a tile.
+const SIDE: u32 = 8;
+/// Submissions in flight: one is prepared while the device works on the other.
+const IN_FLIGHT: usize = 2;
+/// Largest number of work groups along an axis.
+const MOST_GROUPS: usize = 65_535;
+
+/// Why the device did not expose a film.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum NotExposed {
+    /// The caller cancelled.
+    Cancelled,
+    /// It cannot; films are as they were.
+    Refused(String),
+}
+
+/// How a film is exposed.
+#[derive(Debug, Clone)]
+enum Light {
+    Photons { passes: Range<u32> },
+    Beams { per_side: u32 },
+}
+
+/// A film to expose.
+struct Job<'a> {
+    exposure: &'a Exposure<'a>,
+    framing: Framing,
+    layout: FilmLayout,
+    technique: &'a TechniqueShader<'a>,
+    light: Light,
+    cancel: &'a AtomicBool,
+    /// Receives the number of photons or corners of each submission.
+    progress: &'a (dyn Fn(u64) + Sync),
+}
+
+impl Job<'_> {
+    /// Width and height of the area that sends light, in pixels.
+    fn area(&self) -> [u64; 2] {
+        [self.framing.width, self.framing.height]
+            .map(|n| u64::from(n) + 2 * u64::from(self.exposure.margin_px))
+    }
+}
+
+impl GpuPaths<'_> {
+    /// As [`crate::film::photons::expose`], on the device.
+    ///
+    /// # Errors
+    /// If it was cancelled, or the device cannot expose this film.
+    pub(crate) fn expose_photons<const C: usize>(
+        &self,
+        exposure: &Exposure<'_>,
+        films: &[Film<C>],
+        passes: Range<u32>,
+        cancel: &AtomicBool,
+        progress: &(dyn Fn(u64) + Sync),
+    ) -> Result<Tally, NotExposed> {
+        self.expose(exposure, films, Light::Photons { passes }, cancel, progress)
+    }
+
+    /// As [`crate::film::beams::expose_beams`], on the device.
+    ///
+    /// # Errors
+    /// If it was cancelled, or the device cannot expose this film.
+    pub(crate) fn expose_beams<const C: usize>(
+        &self,
+        exposure: &Exposure<'_>,
+        film: &Film<C>,
+        per_side: u32,
+        cancel: &AtomicBool,
+        progress: &(dyn Fn(u64) + Sync),
+    ) -> Result<Tally, NotExposed> {
+        let film = std::slice::from_ref(film);
+        self.expose(exposure, film, Light::Beams { per_side }, cancel, progress)
+    }
+
+    fn expose<const C: usize>(
+        &self,
+        exposure: &Exposure<'_>,
+        films: &[Film<C>],
+        light: Light,
+        cancel: &AtomicBool,
+        progress: &(dyn Fn(u64) + Sync),
+    ) -> Result<Tally, NotExposed> {
+        let refused = NotExposed::Refused;
+        if exposure.solids.is_some() {
+            return Err(refused("the CPU tests which light bodies stop".into()));
+        }
+        let framing = *films[0].framing();
+        let margin = f64::from(exposure.margin_px);
+        let reach_m = [[0.0, 0.0], [1.0, 1.0]]
+            .map(|[x, y]: [f64; 2]| {
+                let of = |part: f64, n: u32| part * (f64::from(n) + 2.0 * margin) - margin;
+                let at = framing.plane_from_pixel(of(x, framing.width), of(y, framing.height));
+                at[0].abs().max(at[1].abs())
+            })
+            .into_iter()
+            .fold(0.0, f64::max);
+        let technique = TechniqueShader::new(exposure.technique, reach_m).map_err(refused)?;
+        let layout = FilmLayout::of(films);
+        let job = Job { exposure, framing, layout, technique: &technique, light, cancel, progress };
+        let [width, height] = job.area();
+        let per_side = match job.light {
+            Light::Photons { .. } => 1,
+            Light::Beams { per_side } => u64::from(per_side),
+        };
+        // Numbers of pixels, tiles and corners are exact in f32 below.
+        const LIMIT: u64 = 1 << 24;
+        let image = technique.image.map_or(0, |i| size_of_val(i.pixels()));
+        let largest = (4 * layout.words()).max(image) as u64;
+        let binding = self.gpu().binding_bytes();
+        if width * per_side > LIMIT || height * per_side > LIMIT || largest > binding {
+            return Err(refused(format!(
+                "its sums take {largest} bytes, and a binding of the device has {binding}"
+            )));
+        }
+
+        // A device that fails loses its film, so the whole film is exposed again.
+        let mut failed = false;
+        loop {
+            let on_device = self.on_device();
+            match self.run(&on_device, &job) {
+                Ok(None) => return Err(NotExposed::Cancelled),
+                Ok(Some(words)) => {
+                    let (mut tally, steps) = add_to_films(layout, &words, films);
+                    tally.sent = match &job.light {
+                        Light::Photons { passes } => width * height * passes.len() as u64,
+                        Light::Beams { per_side } => {
+                            2 * width * height * u64::from(*per_side).pow(2)
+                        }
+                    };
+                    self.work.add_frame(tally.sent, steps);
+                    if failed {
+                        self.cpu_fallback_paths.add_repeated(tally.sent);
+                    }
+                    return Ok(tally);
+                }
+                Err(failure) => {
+                    failed = true;
+                    self.cpu_fallback_paths.set_cause(&failure.error);
+                    if let Err(why) = self.replace_device(&failure) {
+                        return Err(refused(super::failure_message(&why)));
+                    }
+                }
+            }
+        }
+    }
+
+    /// Exposes the film on a device and returns its words; `None` when it was cancelled.
+    fn run(&self, on_device: &DeviceState, job: &Job<'_>) -> Result<Option<Vec<u32>>, Failure> {
+        let gpu = &on_device.gpu;
+        let failure = |error: GpuError| Failure { device: on_device.number, error };
+        if let Some(e) = gpu.failure() {
+            return Err(failure(gpu.failed(e)));
+        }
+        let mut frame = FrameOnDevice::new(self, on_device, job).map_err(failure)?;
+        match &job.light {
+            Light::Photons { passes } => frame.send_photons(self, job, passes.clone()),
+            Light::Beams { per_side } => frame.send_beams(self, job, *per_side),
+        }
+        .and_then(|go_on| if go_on { frame.read(self).map(Some) } else { Ok(None) })
+        .map_err(failure)
+    }
+}
+
+/// A frame's buffers and kernels on a device.
+struct FrameOnDevice<'a> {
+    gpu: Arc<super::Gpu>,
+    params: FrameParams,
+    layout: FilmLayout,
+    frame: wgpu::Buffer,
+    film: wgpu::Buffer,
+    /// Kernels with what is bound to them, in the order in which they run.
+    kernels: Vec<(wgpu::ComputePipeline, [wgpu::BindGroup; 2])>,
+    in_flight: VecDeque<(wgpu::SubmissionIndex, u64)>,
+    progress: &'a (dyn Fn(u64) + Sync),
+}
+
+impl<'a> FrameOnDevice<'a> {
+    fn new(
+        paths: &GpuPaths<'_>,
+        on_device: &DeviceState,
+        job: &Job<'a>,
+    ) -> Result<FrameOnDevice<'a>, GpuError> {
+        let Job { exposure, technique, layout, .. } = job;
+        let from_film = exposure.technique.samples_from_film();
+        let optics = exposure.technique.optics();
+        let mut params = FrameParams::new(
+            &paths.frame,
+            &job.framing,
+            optics,
+            paths.field.n0(),
+            paths.options.step_voxels,
+            exposure.margin_px,
+            from_film,
+        );
+        params.seed = [exposure.seed as u32, (exposure.seed >> 32) as u32];
+        (params.counts, params.outcomes) = (layout.counts() as u32, layout.outcomes() as u32);
+        (params.technique, params.dots_seed) = (technique.numbers, technique.dots_seed);
+        let needs_source = exposure.tilted_beams || exposure.technique.needs_source_points();
+        let shader = FrameShader {
+            march: on_device.kernel,
+            technique,
+            channels: layout.channels(),
+            tilted_beams: exposure.tilted_beams,
+            from_film,
+            counts: layout.has_counts(),
+            sampling: exposure.sampling,
+            source: needs_source.then(|| optics.source_image()),
+        };
+
+        let of_march = paths.params(&on_device.volume, 0);
+        let of_march = bytemuck::bytes_of(&of_march);
+        let gpu = Arc::clone(&on_device.gpu);
+        let (storage, to_device) = (BufferUsages::STORAGE, BufferUsages::COPY_DST);
+        let made = gpu.checked(|| {
+            let frame = gpu.buffer(size_of::<FrameParams>(), BufferUsages::UNIFORM | to_device);
+            // New buffers are zero.
+            let film = gpu.buffer(4 * layout.words(), storage | BufferUsages::COPY_SRC);
+            let march = gpu.buffer(of_march.len(), BufferUsages::UNIFORM | to_device);
+            gpu.queue.write_buffer(&march, 0, of_march);
+            let image = technique.image.map(|i| {
+                let buffer = gpu.buffer(size_of_val(i.pixels()), storage | to_device);
+                gpu.queue.write_buffer(&buffer, 0, bytemuck::cast_slice(i.pixels()));
+                paths.work.add_to_device(buffer.size());
+                buffer
+            });
+            (frame, film, march, image)
+        })?;
+        let (frame, film, march, image) = made;
+        paths.work.add_to_device(march.size());
+        let mut of_march = vec![(0, &march)];
+        of_march.extend(on_device.volume.kinds.as_ref().map(|k| (3, k)));
+        of_march.extend((FIRST_SLAB..).zip(&on_device.volume.slabs));
+        let mut kernels = Vec::new();
+        match job.light {
+            Light::Photons { .. } => {
+                let pipeline = gpu.pipeline(shader.photons(), "photons")?;
+                let mut own = vec![(0, &frame), (1, &film)];
+                own.extend(image.as_ref().map(|i| (3, i)));
+                let groups = gpu.bind(&pipeline, [&of_march, &own])?;
+                kernels.push((pipeline, groups));
+            }
+            Light::Beams { per_side } => {
+                let columns = job.area()[0] as usize * per_side as usize + 1;
+                params.per_row = columns as u32;
+                params.parts = per_side;
+                let words = columns * (rows_at_once(columns) + 1) * (2 + layout.channels());
+                let corners = gpu.checked(|| gpu.buffer(4 * words, storage))?;
+                let pipeline = gpu.pipeline(shader.corners(), "trace_corners")?;
+                let mut own = vec![(0, &frame), (2, &corners)];
+                own.extend(image.as_ref().map(|i| (3, i)));
+                let groups = gpu.bind(&pipeline, [&of_march, &own])?;
+                kernels.push((pipeline, groups));
+                let pipeline = gpu.pipeline(shader.triangles(), "distribute_cells")?;
+                let own = [(0, &frame), (1, &film), (2, &corners)];
+                let groups = gpu.bind(&pipeline, [&[], &own])?;
+                kernels.push((pipeline, groups));
+            }
+        }
+        let (layout, progress) = (*layout, job.progress);
+        let in_flight = VecDeque::new();
+        Ok(FrameOnDevice { gpu, params, layout, frame, film, kernels, in_flight, progress })
+    }
+
+    /// Returns false when it was cancelled.
+    fn send_photons(
+        &mut self,
+        paths: &GpuPaths<'_>,
+        job: &Job<'_>,
+        passes: Range<u32>,
+    ) -> Result<bool, GpuError> {
+        let [width, height] = job.area();
+        let (per_row, rows) = (width.div_ceil(SIDE.into()), height.div_ceil(SIDE.into()));
+        let per_pass = per_row * rows;
+        (self.params.per_row, self.params.per_pass) = (per_row as u32, per_pass as u32);
+        self.params.parts = self.layout.films() as u32;
+        let tiles = per_pass * passes.len() as u64;
+        let photons = width * height * passes.len() as u64;
+        let photons_of = |tiles_done: u64| {
+            (u128::from(photons) * u128::from(tiles_done) / u128::from(tiles)) as u64
+        };
+        let mut first = 0;
+        while first < tiles {
+            let count = (tiles - first).min((PER_SUBMISSION / TILE) as u64);
+            self.params.first = (first % per_pass) as u32;
+            self.params.first_pass = passes.start + (first / per_pass) as u32;
+            let sent = photons_of(first + count) - photons_of(first);
+            if !self.submit(paths, &[[count as u32, 1]], sent, job.cancel)? {
+                return Ok(false);
+            }
+            first += count;
+        }
+        Ok(true)
+    }
+
+    /// Returns false when it was cancelled.
+    fn send_beams(
+        &mut self,
+        paths: &GpuPaths<'_>,
+        job: &Job<'_>,
+        per_side: u32,
+    ) -> Result<bool, GpuError> {
+        let columns = self.params.per_row as usize;
+        let rows = job.area()[1] as usize * per_side as usize;
+        let at_once = rows_at_once(columns);
+        for first in (0..rows).step_by(at_once) {
+            let count = at_once.min(rows - first);
+            (self.params.first, self.params.per_pass) = (first as u32, count as u32);
+            let across = columns.div_ceil(TILE) as u32;
+            let groups = [[across, count as u32 + 1], [across, count as u32]];
+            if !self.submit(paths, &groups, (count * columns) as u64, job.cancel)? {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    /// Runs the kernels with these numbers of work groups. Returns false when it was cancelled.
+    fn submit(
+        &mut self,
+        paths: &GpuPaths<'_>,
+        groups: &[[u32; 2]],
+        rays: u64,
+        cancel: &AtomicBool,
+    ) -> Result<bool, GpuError> {
+        while self.in_flight.len() >= IN_FLIGHT {
+            self.wait_for_first()?;
+        }
+        if cancel.load(Ordering::Relaxed) {
+            return Ok(false);
+        }
+        let gpu = &self.gpu;
+        gpu.queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&self.params));
+        paths.work.add_to_device(self.frame.size());
+        let mut commands = gpu.device.create_command_encoder(&Default::default());
+        {
+            let mut pass = commands.begin_compute_pass(&Default::default());
+            for ((pipeline, bound), [x, y]) in self.kernels.iter().zip(groups) {
+                pass.set_pipeline(pipeline);
+                pass.set_bind_group(0, &bound[0], &[]);
+                pass.set_bind_group(1, &bound[1], &[]);
+                pass.dispatch_workgroups(*x, *y, 1);
+            }
+        }
+        let index = gpu.queue.submit([commands.finish()]);
+        paths.work.add_submission(groups.len() as u64);
+        self.in_flight.push_back((index, rays));
+        Ok(true)
+    }
+
+    fn wait_for_first(&mut self) -> Result<(), GpuError> {
+        if let Some((index, rays)) = self.in_flight.pop_front() {
+            self.gpu.wait(index)?;
+            self.gpu.mark_batch_finished();
+            (self.progress)(rays);
+        }
+        Ok(())
+    }
+
+    /// Waits for the film and reads its words.
+    fn read(mut self, paths: &GpuPaths<'_>) -> Result<Vec<u32>, GpuError> {
+        let bytes = self.film.size();
+        let gpu = Arc::clone(&self.gpu);
+        let usage = BufferUsages::MAP_READ | BufferUsages::COPY_DST;
+        let readback = gpu.checked(|| gpu.buffer(bytes as usize, usage))?;
+        let mut commands = gpu.device.create_command_encoder(&Default::default());
+        commands.copy_buffer_to_buffer(&self.film, 0, &readback, 0, bytes);
+        gpu.queue.submit([commands.finish()]);
+        while !self.in_flight.is_empty() {
+            self.wait_for_first()?;
+        }
+        let words = gpu.read(&readback)?;
+        paths.work.add_from_device(bytes);
+        Ok(words)
+    }
+}
+
+/// Rows of cells in a submission, for rows of this many corners.
+fn rows_at_once(columns: usize) -> usize {
+    (PER_SUBMISSION / columns).clamp(1, MOST_GROUPS - 1)
+}

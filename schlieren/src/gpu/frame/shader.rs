@@ -1,0 +1,171 @@
+//! Assembles the shaders of a frame: the march, and what the scene's light and technique need.
+
+use super::technique::TechniqueShader;
+use crate::gpu::kernel::Kernel;
+use crate::optics::SourceImage;
+use rt_core::sampler::Sampling;
+
+/// The features of a frame.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct FrameShader<'a> {
+    pub(super) march: Kernel,
+    pub(super) technique: &'a TechniqueShader<'a>,
+    /// Channels of the film: 1, or 3 for colours.
+    pub(super) channels: usize,
+    /// Whether each photon travels in the beam of its own source point.
+    pub(super) tilted_beams: bool,
+    /// Whether energy stays in the pixel of the ray.
+    pub(super) from_film: bool,
+    /// Whether photons are counted.
+    pub(super) counts: bool,
+    pub(super) sampling: Sampling,
+    /// The source, if each photon has its own point of it.
+    pub(super) source: Option<SourceImage>,
+}
+
+impl FrameShader<'_> {
+    fn film(&self) -> String {
+        let mut text = format!("const CHANNELS = {}u;\n", self.channels);
+        text += include_str!("frame.wgsl");
+        text + include_str!("film.wgsl")
+    }
+
+    fn light(&self) -> String {
+        let source = match self.source {
+            None | Some(SourceImage::Point) => 0,
+            Some(SourceImage::Rectangle { .. }) => 1,
+            Some(SourceImage::Disc { .. }) => 2,
+        };
+        let mut text = format!(
+            "const TILTED_BEAMS = {};\nconst FROM_FILM = {};\nconst RANDOM = {};\nconst SOURCE = \
+             {source}u;\n",
+            self.tilted_beams,
+            self.from_film,
+            self.sampling == Sampling::Random,
+        );
+        for part in [
+            include_str!("double.wgsl"),
+            include_str!("sampler.wgsl"),
+            include_str!("start.wgsl"),
+            include_str!("exit.wgsl"),
+            &self.technique.text,
+        ] {
+            text += part;
+        }
+        self.march.march() + &text
+    }
+
+    /// Traces photons and deposits them. The entry point is `photons`.
+    pub(super) fn photons(&self) -> String {
+        let counts = format!("const COUNTS = {};\n", self.counts);
+        self.light() + &self.film() + &counts + include_str!("photons.wgsl")
+    }
+
+    /// Traces the corners of a beam's cells. The entry point is `trace_corners`.
+    pub(super) fn corners(&self) -> String {
+        let channels = format!("const CHANNELS = {}u;\n", self.channels);
+        self.light() + &channels + include_str!("frame.wgsl") + include_str!("corners.wgsl")
+    }
+
+    /// Distributes the energy of cells. The entry point is `distribute_cells`.
+    pub(super) fn triangles(&self) -> String {
+        self.film() + include_str!("triangles.wgsl")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::params::FrameParams;
+    use super::*;
+    use crate::cutoff::{Aperture, ColorWheel, Cutoff, FilterImage, Knife, KnifePosition, Passes};
+    use crate::interpolate::Interpolant;
+    use crate::optics::{Optics, SourceShape};
+    use crate::technique::{Technique, bos, interferogram, schlieren::Schlieren};
+    use wgpu::naga;
+
+    fn techniques() -> Vec<Technique> {
+        let sources = [
+            SourceShape::Point,
+            SourceShape::Slit { width_m: 1e-3, length_m: 5e-3, angle_deg: 0.0 },
+            SourceShape::Slit { width_m: 1e-3, length_m: 5e-3, angle_deg: 30.0 },
+            SourceShape::Circle { diameter_m: 1e-3 },
+        ];
+        let cutoffs = [
+            Cutoff::Open,
+            Cutoff::Knife(Knife { angle_deg: 0.0, position: KnifePosition::OpenFraction(0.5) }),
+            Cutoff::Aperture(Aperture {
+                radius_m: 1e-3,
+                center_m: [0.0; 2],
+                passes: Passes::Outside,
+            }),
+            Cutoff::Color(ColorWheel { radius_m: 1e-3, red_deg: 0.0 }),
+            Cutoff::Image(FilterImage::new(2, 1, [1e-2; 2], vec![[1.0; 3], [0.0; 3]]).unwrap()),
+        ];
+        let mut all = vec![Technique::Shadowgraph(Optics::DEFAULT)];
+        for source in sources {
+            let optics = Optics { source, ..Optics::DEFAULT };
+            for cutoff in &cutoffs {
+                let s = Schlieren::new(optics, cutoff, false);
+                all.push(Technique::Schlieren(s.clone()));
+                all.push(Technique::Schlieren(s.with_band([0.2, 0.3, 0.5])));
+            }
+        }
+        all.push(Technique::Interferogram(interferogram::Interferogram::new(
+            Optics::DEFAULT,
+            633e-9,
+            1.0,
+            None,
+            1.0,
+        )));
+        let dots = bos::Dots { diameter_m: 1e-3, spacing_m: 2e-3, seed: 1 };
+        all.push(Technique::Bos(bos::Bos::new(Optics::DEFAULT, dots)));
+        all
+    }
+
+    fn parsed(wgsl: &str) -> naga::Module {
+        naga::front::wgsl::parse_str(wgsl).unwrap_or_else(|e| panic!("{}", e.emit_to_string(wgsl)))
+    }
+
+    /// As the test of the march's shader: valid without any capability that only some devices have.
+    #[test]
+    fn every_shader_of_a_frame_is_valid_wgsl_for_every_device() {
+        use naga::valid::{Capabilities, ValidationFlags, Validator};
+        let mut checked = 0;
+        for technique in &techniques() {
+            let of_technique = TechniqueShader::new(technique, 1.0).unwrap();
+            for k in 0..8u32 {
+                let source = technique.optics().source_image();
+                let shader = FrameShader {
+                    march: Kernel {
+                        interpolant: Interpolant::BSpline,
+                        opd: technique.needs_opd(),
+                        nodes: k & 1 != 0,
+                        slabs: 1,
+                    },
+                    technique: &of_technique,
+                    channels: if k & 2 == 0 { 1 } else { 3 },
+                    tilted_beams: k & 4 != 0,
+                    from_film: technique.samples_from_film(),
+                    counts: k & 1 != 0,
+                    sampling: Sampling::ALL[(k & 1) as usize],
+                    source: (k & 4 != 0 || technique.needs_source_points()).then_some(source),
+                };
+                for wgsl in [shader.photons(), shader.corners(), shader.triangles()] {
+                    let module = parsed(&wgsl);
+                    let mut v = Validator::new(ValidationFlags::all(), Capabilities::empty());
+                    if let Err(e) = v.validate(&module) {
+                        panic!("{shader:?}: {}", e.emit_to_string(&wgsl));
+                    }
+                    let named = |name| move |t: &naga::Type| t.name.as_deref() == Some(name);
+                    let frame = module.types.iter().find(|(_, t)| named("Frame")(t)).unwrap().1;
+                    let naga::TypeInner::Struct { span, .. } = frame.inner else {
+                        panic!("Frame is no structure")
+                    };
+                    assert_eq!(span as usize, size_of::<FrameParams>());
+                    checked += 1;
+                }
+            }
+        }
+        assert_eq!(checked, (1 + 4 * 10 + 2) * 8 * 3);
+    }
+}

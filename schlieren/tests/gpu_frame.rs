@@ -1,0 +1,271 @@
+//! Tests frames that a GPU exposes as a whole against those of the CPU.
+//!
+//! Any Vulkan device will do, also Mesa's lavapipe. Without one these tests print that they are
+//! skipped and pass, unless RTSV_REQUIRE_PEERS=1.
+#![cfg(feature = "gpu")]
+
+mod common;
+
+use common::{cube, lopsided};
+use schlieren::field::{Field, Node};
+use schlieren::gpu::Gpu;
+use schlieren::render::{Control, Layers, RenderOutput, TestSection, render};
+use schlieren::scene::Scene;
+use std::io::Write as _;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Whether there is a device. Without one, prints why the test is skipped.
+fn has_gpu() -> bool {
+    match Gpu::shared() {
+        Ok(_) => true,
+        Err(e) => {
+            assert!(std::env::var_os("RTSV_REQUIRE_PEERS").is_none_or(|v| v != "1"), "{e}");
+            // The test harness captures eprintln! of tests that pass.
+            let _ = writeln!(std::io::stderr(), "skipped: {e}");
+            false
+        }
+    }
+}
+
+const PHOTONS: &str = "[sampling]\nmethod = \"photons\"\nsamples = 4\nseed = 77\n";
+const BEAMS: &str = "[sampling]\nmethod = \"beams\"\ncells_per_side = 2\n";
+const NO_FILTER: &str = "[sampling.filter]\nkind = \"none\"\n";
+
+fn scene(device: &str, film: &str, rest: &str) -> Scene {
+    let toml = format!(
+        "[flow]\nfile = \"\"\ndensity = \"-\"\n[film]\nsize = [41, 30]\n{film}[march]\ndevice = \
+         \"{device}\"\nmethod = \"verlet\"\ninterpolant = \"b-spline\"\nstep_voxels = 1.0\n{rest}"
+    );
+    Scene::from_toml(&toml).unwrap_or_else(|e| panic!("{toml}: {e}"))
+}
+
+fn exposed(field: &Field, scene: &Scene) -> RenderOutput {
+    let section = TestSection::of_fields(scene, vec![field.clone()], None).unwrap();
+    let layers = Layers { counts: true, noise: true, ..Layers::NONE };
+    render(scene, &section, layers, &Control::default()).unwrap()
+}
+
+/// The frames of the GPU and of the CPU. The GPU must have exposed its own.
+fn both(field: &Field, film: &str, rest: &str) -> [RenderOutput; 2] {
+    let [gpu, cpu] = ["gpu", "cpu"].map(|d| exposed(field, &scene(d, film, rest)));
+    let device = gpu.report.device.expect("the work of the device");
+    let tally = gpu.report.tally;
+    assert_eq!(device.photons, tally.sent, "{rest}: {:?}", gpu.report.warnings);
+    assert!(gpu.report.device.is_some() && cpu.report.device.is_none());
+    assert_eq!(tally.sent, cpu.report.tally.sent, "{rest}");
+    assert_eq!(tally.blocked_in_field, cpu.report.tally.blocked_in_field, "{rest}");
+    assert_eq!(tally.not_a_number, 0);
+    [gpu, cpu]
+}
+
+/// Largest difference of the two images, and the largest brightness.
+fn difference(a: &RenderOutput, b: &RenderOutput) -> [f32; 2] {
+    let mut worst = [0.0f32; 2];
+    for (a, b) in a.pixels.iter().zip(&b.pixels) {
+        for c in 0..3 {
+            assert!(a[c].is_finite());
+            worst = [worst[0].max((a[c] - b[c]).abs()), worst[1].max(b[c])];
+        }
+    }
+    worst
+}
+
+const KNIFE: &str = "[technique]\nkind = \"schlieren\"\n[technique.cutoff]\nkind = \"knife\"\n";
+
+/// The scenes: technique, cut-off and source of each.
+fn techniques() -> Vec<(&'static str, String)> {
+    let schlieren =
+        |cutoff: &str| format!("[technique]\nkind = \"schlieren\"\n[technique.cutoff]\n{cutoff}");
+    let disc = "[light.source]\nkind = \"circle\"\ndiameter_m = 2e-3\n";
+    let slit = "[light.source]\nkind = \"slit\"\nwidth_m = 1e-3\nlength_m = 2e-3\nangle_deg = \
+                20.0\n";
+    vec![
+        ("knife", KNIFE.to_string()),
+        ("knife before a turned slit", KNIFE.to_string() + slit),
+        ("knife before a disc", KNIFE.to_string() + disc),
+        ("circle", schlieren("kind = \"circle\"\nradius_m = 1e-3\n") + disc),
+        ("circle before a slit", schlieren("kind = \"circle\"\nradius_m = 4e-4\n")),
+        ("dark field", schlieren("kind = \"complemented-circle\"\nradius_m = 1e-3\n") + disc),
+        ("colours", schlieren("kind = \"color\"\nradius_m = 2e-3\n")),
+        ("interferogram", "[technique]\nkind = \"interferogram\"\n".into()),
+        (
+            "finite fringes",
+            "[technique]\nkind = \"interferogram\"\nfringe_spacing_m = 0.05\nvisibility = 0.7\n"
+                .into(),
+        ),
+        ("dots", "[technique]\nkind = \"bos\"\nseed = 5\n".into()),
+        ("shadowgraph", "[technique]\nkind = \"shadowgraph\"\n".into()),
+    ]
+}
+
+/// Photons land in other pixels where their positions differ by a rounding, and step functions
+/// (sampled sources, dots) switch. Each such photon changes a pixel by its energy; without filter
+/// the number of changed pixels counts them.
+#[test]
+fn photons_of_the_device_are_those_of_the_cpu() {
+    if !has_gpu() {
+        return;
+    }
+    let field = cube(33, lopsided);
+    for (name, technique) in techniques() {
+        let film = if name == "shadowgraph" { "focus_m = 3.0\n" } else { "" };
+        let [gpu, cpu] = both(&field, film, &format!("{technique}{PHOTONS}{NO_FILTER}"));
+        let off = |(a, b): &(&[f32; 3], &[f32; 3])| (0..3).any(|c| (a[c] - b[c]).abs() > 2e-5);
+        let changed = gpu.pixels.iter().zip(&cpu.pixels).filter(off).count();
+        let [worst, brightest] = difference(&gpu, &cpu);
+        assert!(changed <= 3, "{name}: {changed} pixels differ, by {worst} of {brightest}");
+        let [low, high] = cpu.report.levels;
+        assert!(high - low > 0.02, "{name}: an empty image, {low} to {high}");
+        let [a, b] = [&gpu, &cpu].map(|o| o.report.tally);
+        assert!(a.on_film.abs_diff(b.on_film) <= 2 && a.landed == b.landed, "{name}: {a:?} {b:?}");
+        let [a, b] = [&gpu, &cpu].map(|o| o.counts.clone().expect("counts"));
+        let others = a.iter().zip(&b).filter(|(a, b)| a != b).count();
+        assert!(others <= 4, "{name}: {others} pixels have other numbers of photons");
+        assert_eq!(gpu.noise.is_some(), cpu.noise.is_some());
+    }
+}
+
+#[test]
+fn beams_of_the_device_are_those_of_the_cpu() {
+    if !has_gpu() {
+        return;
+    }
+    let field = cube(33, lopsided);
+    for (name, technique) in techniques() {
+        for film in ["", "focus_m = 3.0\n"] {
+            let [gpu, cpu] = both(&field, film, &format!("{technique}{BEAMS}"));
+            let [worst, brightest] = difference(&gpu, &cpu);
+            assert!(worst < 2e-5 * brightest.max(1.0), "{name} {film}: {worst:e} of {brightest}");
+            let [a, b] = [&gpu, &cpu].map(|o| o.report.tally);
+            assert_eq!(a.landed, b.landed, "{name}");
+        }
+    }
+}
+
+/// Oblique views, and beams tilted by an extended source, clip the field at other faces for each
+/// ray.
+#[test]
+fn oblique_views_and_tilted_beams_start_where_they_do_on_the_cpu() {
+    if !has_gpu() {
+        return;
+    }
+    let field = cube(24, lopsided);
+    let view = "[view]\ndirection = \"31,-17\"\n";
+    let tilted = "[light]\nbeams = \"tilted\"\n[light.source]\nkind = \"circle\"\ndiameter_m = \
+                  2e-2\n";
+    for rest in
+        [view.to_string(), tilted.to_string(), format!("{view}{tilted}"), format!("{view}{BEAMS}")]
+    {
+        let sampling = if rest.contains("sampling") { "" } else { PHOTONS };
+        let filter = if sampling.is_empty() { "" } else { NO_FILTER };
+        let [gpu, cpu] = both(&field, "", &format!("{KNIFE}{rest}{sampling}{filter}"));
+        let off = |(a, b): &(&[f32; 3], &[f32; 3])| (a[0] - b[0]).abs() > 2e-5;
+        let changed = gpu.pixels.iter().zip(&cpu.pixels).filter(off).count();
+        let [worst, _] = difference(&gpu, &cpu);
+        assert!(changed <= 3, "{rest}: {changed} pixels differ, by up to {worst}");
+    }
+}
+
+/// Bodies and blank places on the lattice stop the same photons.
+#[test]
+fn bodies_of_the_lattice_cast_the_same_shadows() {
+    if !has_gpu() {
+        return;
+    }
+    let n = 24;
+    let plain = cube(n, lopsided);
+    let node = |i: usize| {
+        let at = [i % n, i / n % n, i / (n * n)].map(|k| k as f64 / (n - 1) as f64 - 0.5);
+        if glam::DVec3::from(at).length() < 0.2 { Node::Solid } else { Node::Gas }
+    };
+    let field = Field::new(
+        plain.dims(),
+        plain.spacing_m(),
+        plain.origin_m(),
+        plain.eps().to_vec(),
+        1.0,
+        Some((0..n * n * n).map(node).collect()),
+    )
+    .unwrap();
+    for sampling in [PHOTONS.to_string() + NO_FILTER, BEAMS.to_string()] {
+        let [gpu, cpu] = both(&field, "", &format!("{KNIFE}{sampling}"));
+        assert!(difference(&gpu, &cpu)[0] < 2e-5, "{sampling}");
+        let dark = gpu.pixels.iter().filter(|p| p[0] == 0.0).count();
+        assert!((30..400).contains(&dark), "{dark} pixels are dark");
+    }
+}
+
+/// Only sums come back, and work is given to the device once for each part of a frame.
+#[test]
+fn only_pixels_come_back_and_each_part_of_a_frame_is_submitted_once() {
+    if !has_gpu() {
+        return;
+    }
+    let field = cube(17, lopsided);
+    let rest = format!("{KNIFE}[sampling]\nmethod = \"photons\"\nsamples = 300\n");
+    let out = exposed(&field, &scene("gpu", "", &rest));
+    let work = out.report.device.unwrap();
+    let margin = 2 * u64::from(out.report.margin_px);
+    let photons = (41 + margin) * (30 + margin) * 300;
+    assert_eq!(work.photons, photons);
+    // Tiles of 8 x 8 pixels are not all full. The margin was measured with 4,096 rays.
+    let tiles = (41 + margin).div_ceil(8) * (30 + margin).div_ceil(8) * 300;
+    assert_eq!((work.submissions, work.rays), (1 + (64 * tiles).div_ceil(1 << 18), 4096));
+    // Two films of energies for the noise, and counts; the rays of the margin are 32 bytes each.
+    let film = 41 * 30 * (2 * 8 + 4) + 40;
+    assert_eq!(work.bytes_from_device, film + 4096 * 32);
+    let flow = 4 * 19u64.pow(3);
+    let rays = 4096 * 64 + 96;
+    let frames = work.submissions - 1;
+    assert_eq!(work.bytes_to_device, flow + rays + 96 + frames * 336, "{work:?}");
+}
+
+/// The sums of integers do not depend on the order in which photons arrive.
+#[test]
+fn a_frame_has_the_same_bits_in_every_run() {
+    if !has_gpu() {
+        return;
+    }
+    let field = cube(17, lopsided);
+    for sampling in [PHOTONS, BEAMS] {
+        let scene = scene("gpu", "focus_m = 3.0\n", &format!("{KNIFE}{sampling}"));
+        let first = exposed(&field, &scene).pixels;
+        for _ in 0..3 {
+            assert_eq!(exposed(&field, &scene).pixels, first, "{sampling}");
+        }
+    }
+}
+
+#[test]
+fn what_the_device_cannot_expose_is_named_and_exposed_by_the_cpu() {
+    if !has_gpu() {
+        return;
+    }
+    let field = cube(17, lopsided);
+    let cone = "[sampling.filter]\nkind = \"cone\"\nnearest = 8\n";
+    let [gpu, cpu] =
+        ["gpu", "cpu"].map(|d| exposed(&field, &scene(d, "", &format!("{KNIFE}{PHOTONS}{cone}"))));
+    assert!(difference(&gpu, &cpu)[0] < 1e-3);
+    let named = gpu.report.warnings.iter().filter(|w| w.contains("cone filter")).count();
+    assert_eq!((named, gpu.report.device.unwrap().photons), (1, 0), "{:?}", gpu.report.warnings);
+}
+
+/// Cancelling ends a frame between two submissions.
+#[test]
+fn a_frame_that_is_cancelled_ends() {
+    if !has_gpu() {
+        return;
+    }
+    let field = cube(17, lopsided);
+    let scene =
+        scene("gpu", "", &format!("{KNIFE}[sampling]\nmethod = \"photons\"\nsamples = 4000\n"));
+    let section = TestSection::of_fields(&scene, vec![field], None).unwrap();
+    let cancel = AtomicBool::new(false);
+    let progress = |done: f64| {
+        assert!(done < 0.5, "{done}");
+        cancel.store(true, Ordering::Relaxed);
+    };
+    let control = Control { cancel: &cancel, progress: &progress };
+    let ended = render(&scene, &section, Layers::NONE, &control);
+    assert!(matches!(ended, Err(schlieren::render::RenderError::Cancelled)));
+}
