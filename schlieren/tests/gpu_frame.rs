@@ -11,6 +11,7 @@ use schlieren::field::{Field, Node};
 use schlieren::gpu::Gpu;
 use schlieren::render::{Control, Layers, RenderOutput, TestSection, render};
 use schlieren::scene::Scene;
+use schlieren::solids::Solids;
 use std::io::Write as _;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -212,7 +213,7 @@ fn only_pixels_come_back_and_each_part_of_a_frame_is_submitted_once() {
     let tiles = (41 + margin).div_ceil(8) * (30 + margin).div_ceil(8) * 300;
     assert_eq!((work.submissions, work.rays), (1 + (64 * tiles).div_ceil(1 << 18), 4096));
     // Two films of energies for the noise, and counts; the rays of the margin are 32 bytes each.
-    let film = 41 * 30 * (2 * 8 + 4) + 40;
+    let film = 41 * 30 * (2 * 8 + 4) + 48;
     assert_eq!(work.bytes_from_device, film + 4096 * 32);
     let flow = 4 * 19u64.pow(3);
     let rays = 4096 * 64 + 96;
@@ -268,4 +269,73 @@ fn a_frame_that_is_cancelled_ends() {
     let control = Control { cancel: &cancel, progress: &progress };
     let ended = render(&scene, &section, Layers::NONE, &control);
     assert!(matches!(ended, Err(schlieren::render::RenderError::Cancelled)));
+}
+
+/// A tetrahedron in the flow stops the same photons of both, also in tilted beams and from behind.
+#[test]
+fn meshes_of_bodies_cast_the_same_shadows() {
+    if !has_gpu() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("body.obj");
+    let obj = "v -0.2 -0.15 0\nv 0.25 -0.1 0.02\nv 0 0.22 -0.1\nv 0.03 0.02 0.3\nf 1 2 3\nf 1 2 \
+               4\nf 2 3 4\nf 3 1 4\n";
+    std::fs::write(&file, obj).unwrap();
+    let field = cube(17, lopsided);
+    let tilted = "[light]\nbeams = \"tilted\"\n";
+    for rest in [
+        format!("{KNIFE}{PHOTONS}{NO_FILTER}"),
+        format!("{KNIFE}{BEAMS}"),
+        format!("{KNIFE}{tilted}{PHOTONS}{NO_FILTER}"),
+        format!("[technique]\nkind = \"bos\"\n{PHOTONS}{NO_FILTER}"),
+    ] {
+        let rest = format!("{rest}[solids]\nfiles = [\"{}\"]\n", file.display());
+        let [gpu, cpu] = ["gpu", "cpu"].map(|d| {
+            let scene = scene(d, "", &rest);
+            let (solids, warnings) = Solids::open(&scene.solids.files).unwrap();
+            assert!(warnings.is_empty(), "{warnings:?}");
+            let section =
+                TestSection::of_fields(&scene, vec![field.clone()], Some(solids)).unwrap();
+            render(&scene, &section, Layers::NONE, &Control::default()).unwrap()
+        });
+        let [a, b] = [&gpu, &cpu].map(|o| o.report.tally);
+        assert_eq!(gpu.report.device.unwrap().photons, a.sent, "{:?}", gpu.report.warnings);
+        assert_eq!((a.blocked_by_solids, a.landed), (b.blocked_by_solids, b.landed), "{rest}");
+        let off = |(a, b): &(&[f32; 3], &[f32; 3])| (a[0] - b[0]).abs() > 2e-5;
+        assert!(gpu.pixels.iter().zip(&cpu.pixels).filter(off).count() <= 3, "{rest}");
+        let dark = gpu.pixels.iter().filter(|p| p[0] == 0.0).count();
+        assert!((40..400).contains(&dark), "{dark} pixels are dark: {rest}");
+    }
+}
+
+/// Several wavelengths, each through a field of its own, behind a filter image of two colours.
+#[test]
+fn wavelengths_and_a_filter_image_have_the_colours_of_the_cpu() {
+    if !has_gpu() {
+        return;
+    }
+    let cutoff = "[technique]\nkind = \"schlieren\"\n[technique.cutoff]\nkind = \
+                  \"painted\"\nsize_m = [4e-3, 3e-3]\npixels = 64\nground_rgb = [0.2, 0.5, \
+                  0.9]\n[[technique.cutoff.strokes]]\nfrom_m = [0.0, -1e-3]\nto_m = [2e-4, \
+                  1e-3]\nradius_m = 3e-4\nrgb = [1.0, 0.3, 0.0]\n";
+    let strong = cube(24, |p| 1.1 * lopsided(p));
+    let weak = cube(24, lopsided);
+    for wavelengths in ["633.0", "450.0, 633.0"] {
+        for sampling in [format!("{PHOTONS}{NO_FILTER}"), BEAMS.to_string()] {
+            let light = format!("[light]\nwavelengths_nm = [{wavelengths}]\n");
+            let [gpu, cpu] = ["gpu", "cpu"].map(|d| {
+                let scene = scene(d, "", &format!("{cutoff}{light}{sampling}"));
+                let mut fields = vec![strong.clone(), weak.clone()];
+                fields.truncate(scene.light.wavelengths_nm.len());
+                let section = TestSection::of_fields(&scene, fields, None).unwrap();
+                render(&scene, &section, Layers::NONE, &Control::default()).unwrap()
+            });
+            let device = gpu.report.device.unwrap();
+            assert_eq!(device.photons, gpu.report.tally.sent, "{:?}", gpu.report.warnings);
+            let [worst, _] = difference(&gpu, &cpu);
+            assert!(worst < 2e-5, "{wavelengths}, {sampling}: {worst}");
+            assert!(gpu.colored && gpu.report.levels[1] - gpu.report.levels[0] > 0.05);
+        }
+    }
 }

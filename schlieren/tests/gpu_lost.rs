@@ -13,7 +13,7 @@ use schlieren::path::LightPaths;
 use schlieren::render::{Control, Layers, RenderOutput, TestSection, render};
 use schlieren::scene::Scene;
 use std::io::Write as _;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// The same as in tests/gpu.rs.
 const TOLERANCE: f64 = 1e-6;
@@ -30,6 +30,9 @@ fn gpu() -> Option<Arc<Gpu>> {
         }
     }
 }
+
+/// Tests that lose the program's device take turns.
+static PROGRAM_GPU: Mutex<()> = Mutex::new(());
 
 /// Renders a scene of `field` on the GPU.
 fn rendered(field: &Field) -> RenderOutput {
@@ -92,6 +95,7 @@ fn a_lost_device_is_reopened_and_no_ray_is_left_to_the_cpu() {
 /// The program's device is lost: the next image uses a new one, and the page need not be restarted.
 #[test]
 fn the_program_s_gpu_comes_back_after_it_was_lost() {
+    let _turn = PROGRAM_GPU.lock().unwrap_or_else(PoisonError::into_inner);
     let Some(before) = gpu() else { return };
     let field = cube(17, lopsided);
     let expected = rendered(&field);
@@ -141,4 +145,41 @@ fn a_device_that_is_lost_again_and_again_is_given_up_by_name() {
             && warning.contains("the CPU traced the rest"),
         "{warning}"
     );
+}
+
+/// A frame that was under way starts again on the reopened device, and its film has each photon
+/// once.
+#[test]
+fn a_frame_whose_device_is_lost_starts_again() {
+    let _turn = PROGRAM_GPU.lock().unwrap_or_else(PoisonError::into_inner);
+    let Some(_) = gpu() else { return };
+    let field = cube(17, lopsided);
+    let toml = "[flow]\nfile = \"\"\ndensity = \"-\"\n[film]\nsize = [40, 30]\n[march]\ndevice = \
+                \"gpu\"\nmethod = \"verlet\"\n[sampling]\nmethod = \"photons\"\nsamples = 2000";
+    let scene = Scene::from_toml(toml).unwrap();
+    let section = TestSection::of_fields(&scene, vec![field], None).unwrap();
+    let frame = |lose: bool| {
+        let progress = |done: f64| {
+            if lose && done > 0.0 && done < 1.0 {
+                Gpu::shared().unwrap().destroy();
+            }
+        };
+        let cancel = std::sync::atomic::AtomicBool::new(false);
+        let control = Control { cancel: &cancel, progress: &progress };
+        render(&scene, &section, Layers::NONE, &control).unwrap()
+    };
+    let expected = frame(false);
+    // The device is lost after the first part of each attempt: three times it is reopened, then
+    // the CPU exposes the film.
+    let image = frame(true);
+    let named = image.report.warnings.iter().any(|w| w.contains("lost"));
+    assert!(named, "{:?}", image.report.warnings);
+    let [a, b] = [&image, &expected].map(|o| o.report.tally);
+    assert_eq!((a.sent, a.landed), (b.sent, b.landed));
+    let worst = image
+        .pixels
+        .iter()
+        .zip(&expected.pixels)
+        .fold(0.0f32, |m, (a, b)| m.max((a[0] - b[0]).abs()));
+    assert!(worst < 1e-3, "{worst}");
 }

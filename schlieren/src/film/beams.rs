@@ -99,6 +99,20 @@ pub fn expose_beams<const C: usize>(
     Some(all)
 }
 
+/// The start of the ray through a corner of the cells that divide the beam. Column 0 and row 0 are
+/// the left and the top of the margin.
+#[cfg(feature = "gpu")]
+pub(crate) fn corner_of_cells(
+    exposure: &Exposure<'_>,
+    framing: &super::Framing,
+    column_and_row: [usize; 2],
+    per_side: u32,
+) -> Start {
+    let margin = f64::from(exposure.margin_px);
+    let [x, y] = column_and_row.map(|i| i as f64 / f64::from(per_side) - margin);
+    Start { position_m: framing.plane_from_pixel(x, y).map(|c| c as f32), tilt_rad: [0.0; 2] }
+}
+
 /// Points that sample the source; none when there is a closed form.
 fn source_points(exposure: &Exposure<'_>) -> Vec<PlaneVector> {
     if !exposure.technique.needs_source_points() {

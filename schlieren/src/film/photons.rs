@@ -5,7 +5,7 @@
 //! alone, so passes can be added at any time. Pixels outside the image, up to `margin_px` away,
 //! also send photons, because light from there reaches the image's edge.
 
-use super::{Film, PhotonTile, TILE, Tally, trace_unless_cancelled};
+use super::{Film, Framing, PhotonTile, TILE, Tally, trace_unless_cancelled};
 use crate::optics::PlaneVector;
 use crate::path::{Exit, LightPaths, Start, Status};
 use crate::solids::Solids;
@@ -37,6 +37,43 @@ pub struct Exposure<'a> {
     /// Whether every photon travels in the beam of its own source point, so that an extended source
     /// blurs what is out of focus. Otherwise all photons travel in the axial beam.
     pub tilted_beams: bool,
+}
+
+/// A photon that leaves its pixel.
+pub(crate) struct SentPhoton {
+    pub(crate) start: Start,
+    /// Its start in pixels from the image's upper left corner.
+    position_px: [f32; 2],
+    /// The image of its source point in the cut-off plane.
+    image_point_m: PlaneVector,
+}
+
+impl Exposure<'_> {
+    /// The photon of a pixel in a pass.
+    pub(crate) fn send(&self, framing: &Framing, [x, y]: [i64; 2], pass: u32) -> SentPhoton {
+        // Pixels of the margin have negative coordinates. They wrap to other u32 values, which are
+        // as good for the sampler.
+        let sampler = Sampler::new(self.sampling, self.seed, x as u32, y as u32, pass);
+        let jitter = sampler.square(JITTER);
+        let at = framing
+            .plane_from_pixel(x as f64 + f64::from(jitter[0]), y as f64 + f64::from(jitter[1]));
+        let mut start = Start { position_m: at.map(|c| c as f32), tilt_rad: [0.0; 2] };
+        let mut image_point_m = [0.0; 2];
+        if self.tilted_beams || self.technique.needs_source_points() {
+            let optics = self.technique.optics();
+            image_point_m = optics.source_image().point_m(sampler.square(SOURCE));
+            if self.tilted_beams {
+                start.tilt_rad = optics.tilt_rad(image_point_m);
+            }
+        }
+        let position_px = [x as f32 + jitter[0], y as f32 + jitter[1]];
+        SentPhoton { start, position_px, image_point_m }
+    }
+
+    /// Whether a body stops the light of a start.
+    pub(crate) fn is_behind_body(&self, start: &Start) -> bool {
+        self.solids.is_some_and(|s| s.block(self.paths.view(), start))
+    }
 }
 
 /// A photon on the film, stored for filters that search for neighbours.
@@ -117,7 +154,6 @@ fn expose_tile<const C: usize>(
         (Vec::with_capacity(capacity), Vec::with_capacity(capacity));
     let mut image_points: Vec<PlaneVector> = Vec::with_capacity(capacity);
     let mut exits = vec![Exit::UNDISTURBED; capacity];
-    let needs_source = exposure.tilted_beams || technique.needs_source_points();
     let to_pixels = (1.0 / framing.pixel_m) as f32;
 
     for pass in passes {
@@ -127,32 +163,15 @@ fn expose_tile<const C: usize>(
         image_points.clear();
         for y in corner[1]..end[1] {
             for x in corner[0]..end[0] {
-                // Pixels of the margin have negative coordinates. They wrap to other u32 values,
-                // which are as good for the sampler.
-                let sampler =
-                    Sampler::new(exposure.sampling, exposure.seed, x as u32, y as u32, pass);
-                let jitter = sampler.square(JITTER);
-                let position_px = [x as f32 + jitter[0], y as f32 + jitter[1]];
-                let at = framing.plane_from_pixel(
-                    x as f64 + f64::from(jitter[0]),
-                    y as f64 + f64::from(jitter[1]),
-                );
-                let mut start = Start { position_m: at.map(|c| c as f32), tilt_rad: [0.0; 2] };
-                let mut point = [0.0; 2];
-                if needs_source {
-                    point = optics.source_image().point_m(sampler.square(SOURCE));
-                    if exposure.tilted_beams {
-                        start.tilt_rad = optics.tilt_rad(point);
-                    }
-                }
+                let sent = exposure.send(&framing, [x, y], pass);
                 done.tally.sent += 1;
-                if exposure.solids.is_some_and(|s| s.block(exposure.paths.view(), &start)) {
+                if exposure.is_behind_body(&sent.start) {
                     done.tally.blocked_by_solids += 1;
                     continue;
                 }
-                starts.push(start);
-                positions_px.push(position_px);
-                image_points.push(point);
+                starts.push(sent.start);
+                positions_px.push(sent.position_px);
+                image_points.push(sent.image_point_m);
             }
         }
 

@@ -196,6 +196,11 @@ impl Gpu {
         self.binding_bytes
     }
 
+    /// Number of storage buffers that a kernel can have.
+    pub(super) fn storage_buffers(&self) -> u32 {
+        self.storage_buffers
+    }
+
     /// Number of bindings that a kernel has for the field.
     pub(super) fn slabs(&self) -> u32 {
         // The parameters are not a storage buffer.

@@ -20,7 +20,7 @@ fn trace_corners(@builtin(global_invocation_id) id: vec3u) {
         );
         var photon = trace(position, vec2f(0.0));
         var energy = vec3f(-1.0);
-        if !is_stopped(photon) {
+        if !is_stopped(photon) && !is_behind_body(id.y * frame.per_row + id.x) {
             if SOURCE > 0u {
                 energy = vec3f(0.0);
                 let key = pixel_key(frame.seed, 0u, 0u);

@@ -3,7 +3,7 @@
 use crate::film::{Film, Tally};
 
 /// Outcomes that film.wgsl counts, in its order.
-const OUTCOMES: usize = 5;
+const OUTCOMES: usize = 6;
 
 /// Where the sums of a film lie in its buffer, in words.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -69,10 +69,16 @@ pub(super) fn add_to_films<const C: usize>(
             film.add(pixel, std::array::from_fn(|c| sum(at + 2 * c)), photons);
         }
     }
-    let [stopped, not_a_number, landed, on_film, steps] =
-        [0, 1, 2, 3, 4].map(|i| sum(layout.outcomes() + 2 * i));
-    let tally =
-        Tally { blocked_in_field: stopped, not_a_number, landed, on_film, ..Tally::default() };
+    let [stopped, not_a_number, landed, on_film, steps, blocked_by_solids] =
+        [0, 1, 2, 3, 4, 5].map(|i| sum(layout.outcomes() + 2 * i));
+    let tally = Tally {
+        blocked_in_field: stopped,
+        blocked_by_solids,
+        not_a_number,
+        landed,
+        on_film,
+        ..Tally::default()
+    };
     (tally, steps)
 }
 
@@ -86,16 +92,16 @@ mod tests {
         let framing = Framing::fitted(2, 1, [1.0, 1.0]);
         let films = [Film::<1>::new(framing, true), Film::<1>::new(framing, true)];
         let layout = FilmLayout::of(&films);
-        assert_eq!((layout.counts(), layout.outcomes(), layout.words()), (8, 10, 20));
+        assert_eq!((layout.counts(), layout.outcomes(), layout.words()), (8, 10, 22));
         // Energies 1 and 2.5, then 1/2 and 0; 7 and 8 photons; 2^32 steps.
         let half = 1 << 31;
         let mut words = vec![0, 1, half, 2, half, 0, 0, 0, 7, 8];
-        words.extend([1, 0, 2, 0, 3, 0, 4, 0, 0, 1]);
+        words.extend([1, 0, 2, 0, 3, 0, 4, 0, 0, 1, 5, 0]);
         let (tally, steps) = add_to_films(layout, &words, &films);
         assert_eq!(films[0].to_pixels(1.0), [[1.0], [2.5]]);
         assert_eq!(films[1].to_pixels(1.0), [[0.5], [0.0]]);
         assert_eq!(films[0].counts(), Some(vec![7, 8]));
-        let expected = [tally.blocked_in_field, tally.not_a_number, tally.landed, tally.on_film];
-        assert_eq!((expected, steps), ([1, 2, 3, 4], 1 << 32));
+        let found = [tally.blocked_in_field, tally.not_a_number, tally.landed, tally.on_film];
+        assert_eq!((found, steps, tally.blocked_by_solids), ([1, 2, 3, 4], 1 << 32, 5));
     }
 }

@@ -1,4 +1,5 @@
-//! Exposes a film on the device: only its sums come back.
+//! Exposes a film on the device: only its sums come back. Where bodies stop light, the CPU tests
+//! each ray against their triangles, as it does for its own, and sends a bit.
 //!
 //! A photon's start, its way through the field, the cut-off and the film are one invocation of one
 //! shader. Beams take two: one for the corners of cells and one for their areas. The shader does
@@ -10,6 +11,7 @@
 //! | params.rs, frame.wgsl | the numbers of a frame |
 //! | double.wgsl, sampler.wgsl | numbers of 48 bits; sample points |
 //! | start.wgsl, exit.wgsl | a photon's ray, and what it brings to the film |
+//! | bodies.wgsl | the bits of rays that bodies stop |
 //! | technique.rs, technique/*.wgsl | its energy, by technique and cut-off |
 //! | photons.wgsl, corners.wgsl, triangles.wgsl | entry points |
 //! | film.rs, film.wgsl | the sums |
@@ -24,10 +26,12 @@ use super::cpu_fallback::Failure;
 use super::kernel::FIRST_SLAB;
 use super::paths::DeviceState;
 use super::{GpuError, GpuPaths};
+use crate::film::beams::corner_of_cells;
 use crate::film::photons::Exposure;
 use crate::film::{Film, Framing, Tally};
 use film::{FilmLayout, add_to_films};
 use params::FrameParams;
+use rayon::prelude::*;
 use shader::FrameShader;
 use std::collections::VecDeque;
 use std::ops::Range;
@@ -82,6 +86,11 @@ impl Job<'_> {
         [self.framing.width, self.framing.height]
             .map(|n| u64::from(n) + 2 * u64::from(self.exposure.margin_px))
     }
+
+    /// Corners of a row of beams.
+    fn columns(&self, per_side: u32) -> usize {
+        self.area()[0] as usize * per_side as usize + 1
+    }
 }
 
 impl GpuPaths<'_> {
@@ -125,9 +134,6 @@ impl GpuPaths<'_> {
         progress: &(dyn Fn(u64) + Sync),
     ) -> Result<Tally, NotExposed> {
         let refused = NotExposed::Refused;
-        if exposure.solids.is_some() {
-            return Err(refused("the CPU tests which light bodies stop".into()));
-        }
         let framing = *films[0].framing();
         let margin = f64::from(exposure.margin_px);
         let reach_m = [[0.0, 0.0], [1.0, 1.0]]
@@ -154,6 +160,19 @@ impl GpuPaths<'_> {
         if width * per_side > LIMIT || height * per_side > LIMIT || largest > binding {
             return Err(refused(format!(
                 "its sums take {largest} bytes, and a binding of the device has {binding}"
+            )));
+        }
+
+        let on_device = self.on_device();
+        let buffers = 1
+            + u32::from(image > 0)
+            + u32::from(exposure.solids.is_some())
+            + u32::from(on_device.volume.kinds.is_some())
+            + on_device.volume.slabs.len() as u32;
+        if buffers > on_device.gpu.storage_buffers() {
+            return Err(refused(format!(
+                "it takes {buffers} buffers, and a kernel of the device has {}",
+                on_device.gpu.storage_buffers()
             )));
         }
 
@@ -212,6 +231,8 @@ struct FrameOnDevice<'a> {
     layout: FilmLayout,
     frame: wgpu::Buffer,
     film: wgpu::Buffer,
+    /// Bits of the rays of a submission that bodies stop.
+    bodies: Option<wgpu::Buffer>,
     /// Kernels with what is bound to them, in the order in which they run.
     kernels: Vec<(wgpu::ComputePipeline, [wgpu::BindGroup; 2])>,
     in_flight: VecDeque<(wgpu::SubmissionIndex, u64)>,
@@ -247,6 +268,7 @@ impl<'a> FrameOnDevice<'a> {
             tilted_beams: exposure.tilted_beams,
             from_film,
             counts: layout.has_counts(),
+            bodies: exposure.solids.is_some(),
             sampling: exposure.sampling,
             source: needs_source.then(|| optics.source_image()),
         };
@@ -270,6 +292,17 @@ impl<'a> FrameOnDevice<'a> {
             (frame, film, march, image)
         })?;
         let (frame, film, march, image) = made;
+        let rays = match job.light {
+            Light::Photons { .. } => PER_SUBMISSION,
+            Light::Beams { per_side } => {
+                let columns = job.columns(per_side);
+                columns * (rows_at_once(columns) + 1)
+            }
+        };
+        let bodies = exposure
+            .solids
+            .map(|_| gpu.checked(|| gpu.buffer(4 * rays.div_ceil(32), storage | to_device)))
+            .transpose()?;
         paths.work.add_to_device(march.size());
         let mut of_march = vec![(0, &march)];
         of_march.extend(on_device.volume.kinds.as_ref().map(|k| (3, k)));
@@ -280,18 +313,19 @@ impl<'a> FrameOnDevice<'a> {
                 let pipeline = gpu.pipeline(shader.photons(), "photons")?;
                 let mut own = vec![(0, &frame), (1, &film)];
                 own.extend(image.as_ref().map(|i| (3, i)));
+                own.extend(bodies.as_ref().map(|b| (4, b)));
                 let groups = gpu.bind(&pipeline, [&of_march, &own])?;
                 kernels.push((pipeline, groups));
             }
             Light::Beams { per_side } => {
-                let columns = job.area()[0] as usize * per_side as usize + 1;
-                params.per_row = columns as u32;
+                params.per_row = job.columns(per_side) as u32;
                 params.parts = per_side;
-                let words = columns * (rows_at_once(columns) + 1) * (2 + layout.channels());
+                let words = rays * (2 + layout.channels());
                 let corners = gpu.checked(|| gpu.buffer(4 * words, storage))?;
                 let pipeline = gpu.pipeline(shader.corners(), "trace_corners")?;
                 let mut own = vec![(0, &frame), (2, &corners)];
                 own.extend(image.as_ref().map(|i| (3, i)));
+                own.extend(bodies.as_ref().map(|b| (4, b)));
                 let groups = gpu.bind(&pipeline, [&of_march, &own])?;
                 kernels.push((pipeline, groups));
                 let pipeline = gpu.pipeline(shader.triangles(), "distribute_cells")?;
@@ -302,7 +336,7 @@ impl<'a> FrameOnDevice<'a> {
         }
         let (layout, progress) = (*layout, job.progress);
         let in_flight = VecDeque::new();
-        Ok(FrameOnDevice { gpu, params, layout, frame, film, kernels, in_flight, progress })
+        Ok(FrameOnDevice { gpu, params, layout, frame, film, bodies, kernels, in_flight, progress })
     }
 
     /// Returns false when it was cancelled.
@@ -328,6 +362,22 @@ impl<'a> FrameOnDevice<'a> {
             self.params.first = (first % per_pass) as u32;
             self.params.first_pass = passes.start + (first / per_pass) as u32;
             let sent = photons_of(first + count) - photons_of(first);
+            if let Some(bodies) = &self.bodies {
+                let place = |tile: u64, lane: u32| {
+                    let (in_pass, margin) = (tile % per_pass, i64::from(job.exposure.margin_px));
+                    let x = in_pass % per_row * u64::from(SIDE) + u64::from(lane % SIDE);
+                    let y = in_pass / per_row * u64::from(SIDE) + u64::from(lane / SIDE);
+                    let pass = passes.start + (tile / per_pass) as u32;
+                    job.exposure
+                        .send(&job.framing, [x as i64 - margin, y as i64 - margin], pass)
+                        .start
+                };
+                let bits = bits(count as usize * TILE, |ray| {
+                    let tile = first + (ray / TILE) as u64;
+                    job.exposure.is_behind_body(&place(tile, (ray % TILE) as u32))
+                });
+                self.write(paths, bodies, &bits);
+            }
             if !self.submit(paths, &[[count as u32, 1]], sent, job.cancel)? {
                 return Ok(false);
             }
@@ -349,6 +399,18 @@ impl<'a> FrameOnDevice<'a> {
         for first in (0..rows).step_by(at_once) {
             let count = at_once.min(rows - first);
             (self.params.first, self.params.per_pass) = (first as u32, count as u32);
+            if let Some(bodies) = &self.bodies {
+                let bits = bits((count + 1) * columns, |ray| {
+                    let at = [ray % columns, first + ray / columns];
+                    job.exposure.is_behind_body(&corner_of_cells(
+                        job.exposure,
+                        &job.framing,
+                        at,
+                        per_side,
+                    ))
+                });
+                self.write(paths, bodies, &bits);
+            }
             let across = columns.div_ceil(TILE) as u32;
             let groups = [[across, count as u32 + 1], [across, count as u32]];
             if !self.submit(paths, &groups, (count * columns) as u64, job.cancel)? {
@@ -391,6 +453,12 @@ impl<'a> FrameOnDevice<'a> {
         Ok(true)
     }
 
+    /// Writes to a buffer before the next submission.
+    fn write(&self, paths: &GpuPaths<'_>, buffer: &wgpu::Buffer, words: &[u32]) {
+        self.gpu.queue.write_buffer(buffer, 0, bytemuck::cast_slice(words));
+        paths.work.add_to_device(size_of_val(words) as u64);
+    }
+
     fn wait_for_first(&mut self) -> Result<(), GpuError> {
         if let Some((index, rays)) = self.in_flight.pop_front() {
             self.gpu.wait(index)?;
@@ -416,6 +484,14 @@ impl<'a> FrameOnDevice<'a> {
         paths.work.add_from_device(bytes);
         Ok(words)
     }
+}
+
+/// One bit for each of so many rays, from the lowest of the first word.
+fn bits(rays: usize, is_set: impl Fn(usize) -> bool + Sync) -> Vec<u32> {
+    let word = |w: usize| {
+        (32 * w..rays.min(32 * w + 32)).fold(0, |a, ray| a | u32::from(is_set(ray)) << (ray % 32))
+    };
+    (0..rays.div_ceil(32)).into_par_iter().map(word).collect()
 }
 
 /// Rows of cells in a submission, for rows of this many corners.

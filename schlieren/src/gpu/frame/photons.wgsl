@@ -1,7 +1,11 @@
 // Sends photons: one invocation traces one photon and deposits it. A work group has a tile of
 // 8 x 8 pixels in the pass `number`.
 
-fn send(x: i32, y: i32, number: u32) {
+fn send(x: i32, y: i32, number: u32, ray: u32) {
+    if is_behind_body(ray) {
+        atomicAdd(&outcomes[BEHIND_BODY], 1u);
+        return;
+    }
     let key = pixel_key(frame.seed, u32(x), u32(y));
     let jitter = square(key, number, 0u);
     let position = plane_point(two_sum(f32(x), jitter.x), two_sum(f32(y), jitter.y));
@@ -49,7 +53,7 @@ fn photons(
     let x = in_pass % frame.per_row * 8u + lane % 8u;
     let y = in_pass / frame.per_row * 8u + lane / 8u;
     if x < frame.width + 2u * frame.margin && y < frame.height + 2u * frame.margin {
-        send(i32(x) - i32(frame.margin), i32(y) - i32(frame.margin), number);
+        send(i32(x) - i32(frame.margin), i32(y) - i32(frame.margin), number, 64u * group.x + lane);
     }
     add_outcomes(lane);
 }

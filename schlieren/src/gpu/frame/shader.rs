@@ -18,6 +18,8 @@ pub(super) struct FrameShader<'a> {
     pub(super) from_film: bool,
     /// Whether photons are counted.
     pub(super) counts: bool,
+    /// Whether the CPU tells which rays bodies stop.
+    pub(super) bodies: bool,
     pub(super) sampling: Sampling,
     /// The source, if each photon has its own point of it.
     pub(super) source: Option<SourceImage>,
@@ -52,6 +54,11 @@ impl FrameShader<'_> {
         ] {
             text += part;
         }
+        text += if self.bodies {
+            include_str!("bodies.wgsl")
+        } else {
+            "fn is_behind_body(ray: u32) -> bool {\n    return false;\n}\n"
+        };
         self.march.march() + &text
     }
 
@@ -147,6 +154,7 @@ mod tests {
                     tilted_beams: k & 4 != 0,
                     from_film: technique.samples_from_film(),
                     counts: k & 1 != 0,
+                    bodies: k & 2 != 0,
                     sampling: Sampling::ALL[(k & 1) as usize],
                     source: (k & 4 != 0 || technique.needs_source_points()).then_some(source),
                 };
