@@ -272,7 +272,9 @@ fn a_field_larger_than_a_binding_is_the_same_field() {
             GpuOptions { quantities: PathQuantities { opd: true }, ..GpuOptions::default() };
         let view = oblique();
         let one = GpuPaths::new(whole.clone(), &field, view, interpolant, options).unwrap();
-        assert_eq!(one.slabs(), 1);
+        // A driver on the CPU has coefficients as a texture.
+        let is_texture = whole.is_software() && interpolant == Interpolant::BSpline;
+        assert_eq!(one.slabs(), usize::from(!is_texture));
         let expected = trace(&one, &starts);
         // The field has 20 layers of cells. A binding holds 8, then 4 of them with their halo.
         for (layers, slabs) in [(8, 3), (4, 5)] {

@@ -1,5 +1,7 @@
 // Prefiltered cubic B-spline from slab SLAB. `o` is the first of the 4x4x4 coefficients there.
-fn sample_SLAB(o: u32, fraction: vec3f) -> vec4f {
+//
+// The host adds `row_SLAB`: four coefficients along x, j rows and k layers after `o`.
+fn sample_SLAB(o: ORIGIN, fraction: vec3f) -> vec4f {
     // Weights of the four coefficients along each axis, and of their three differences for the
     // derivative.
     let s = vec3f(1.0) - fraction;
@@ -22,14 +24,10 @@ fn sample_SLAB(o: u32, fraction: vec3f) -> vec4f {
     var along_z = vec4f(0.0);
     var before = vec4f(0.0);
     for (var j = 0u; j < 4u; j++) {
-        let a = o + j * params.row;
-        let b = a + params.layer;
-        let c = b + params.layer;
-        let d = c + params.layer;
-        let ca = vec4f(values_SLAB[a], values_SLAB[a + 1u], values_SLAB[a + 2u], values_SLAB[a + 3u]);
-        let cb = vec4f(values_SLAB[b], values_SLAB[b + 1u], values_SLAB[b + 2u], values_SLAB[b + 3u]);
-        let cc = vec4f(values_SLAB[c], values_SLAB[c + 1u], values_SLAB[c + 2u], values_SLAB[c + 3u]);
-        let cd = vec4f(values_SLAB[d], values_SLAB[d + 1u], values_SLAB[d + 2u], values_SLAB[d + 3u]);
+        let ca = row_SLAB(o, j, 0u);
+        let cb = row_SLAB(o, j, 1u);
+        let cc = row_SLAB(o, j, 2u);
+        let cd = row_SLAB(o, j, 3u);
         let on_z = fma(vec4f(w3.z), cd, fma(vec4f(w2.z), cc, fma(vec4f(w1.z), cb, w0.z * ca)));
         let dz = fma(vec4f(d2.z), cd - cc, fma(vec4f(d1.z), cc - cb, d0.z * (cb - ca)));
         value = fma(vec4f(wy[j]), on_z, value);

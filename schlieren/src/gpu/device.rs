@@ -252,15 +252,15 @@ impl Gpu {
     pub(super) fn bind(
         &self,
         pipeline: &wgpu::ComputePipeline,
-        groups: [&[(u32, &wgpu::Buffer)]; 2],
+        groups: [&[(u32, wgpu::BindingResource<'_>)]; 2],
     ) -> Result<[wgpu::BindGroup; 2], GpuError> {
         self.checked(|| {
             [0, 1].map(|group| {
                 let entries: Vec<_> = groups[group]
                     .iter()
-                    .map(|(binding, b)| wgpu::BindGroupEntry {
+                    .map(|(binding, resource)| wgpu::BindGroupEntry {
                         binding: *binding,
-                        resource: b.as_entire_binding(),
+                        resource: resource.clone(),
                     })
                     .collect();
                 self.device.create_bind_group(&wgpu::BindGroupDescriptor {

@@ -2,7 +2,6 @@
 //! scene needs.
 
 use crate::interpolate::Interpolant;
-use std::fmt::Write as _;
 
 /// First binding of the field's slabs. The bindings before it are parameters, rays, kernel outputs
 /// and kinds of nodes.
@@ -17,7 +16,8 @@ pub(super) struct Kernel {
     pub(super) opd: bool,
     /// Whether the field has blank or solid nodes.
     pub(super) nodes: bool,
-    /// Number of bindings over which the field is divided.
+    /// Number of buffers over which the field is divided; 0 if it is a texture with a row of four
+    /// coefficients in each texel.
     pub(super) slabs: u32,
 }
 
@@ -52,14 +52,21 @@ impl Kernel {
         }
         let source =
             if spline { include_str!("bspline.wgsl") } else { include_str!("trilinear.wgsl") };
-        for slab in 0..self.slabs {
-            let binding = FIRST_SLAB + slab;
-            let declared = writeln!(
-                text,
-                "@group(0) @binding({binding}) var<storage, read> values_{slab}: array<f32>;"
-            );
-            declared.expect("writing to a String cannot fail");
-            text += &source.replace("SLAB", &slab.to_string());
+        let (values, origin) = match (self.slabs, spline) {
+            (0, _) => (include_str!("bspline_rows.wgsl"), "vec3u"),
+            (_, true) => (include_str!("bspline_slab.wgsl"), "u32"),
+            (_, false) => {
+                ("@group(0) @binding(BINDING) var<storage, read> values_SLAB: array<f32>;\n", "u32")
+            }
+        };
+        for slab in 0..self.slabs.max(1) {
+            let binding = (FIRST_SLAB + slab).to_string();
+            for part in [values, source] {
+                text += &part
+                    .replace("BINDING", &binding)
+                    .replace("ORIGIN", origin)
+                    .replace("SLAB", &slab.to_string());
+            }
         }
         text += &self.sample();
         text
@@ -69,6 +76,9 @@ impl Kernel {
     /// holds the point.
     fn sample(&self) -> String {
         let mut text = "fn sample(at: vec3f) -> vec4f {\n    let p = locate(at);\n".to_string();
+        if self.slabs == 0 {
+            return text + "    return sample_0(p.cell, p.fraction);\n}\n";
+        }
         let offset = |z: &str| format!("p.cell.x + p.cell.y * params.row + ({z}) * params.layer");
         if self.slabs == 1 {
             text += &format!("    return sample_0({}, p.fraction);\n}}\n", offset("p.cell.z"));
@@ -100,9 +110,10 @@ mod tests {
             interpolant: if k & 1 == 0 { Interpolant::BSpline } else { Interpolant::Trilinear },
             opd: k & 2 != 0,
             nodes: k & 4 != 0,
-            slabs: [1, 2, 7][(k >> 3) as usize],
+            slabs: [1, 2, 7, 0][(k >> 3) as usize],
         };
-        (0..24).map(of)
+        // Rows are coefficients.
+        (0..32).map(of).filter(|k| k.slabs > 0 || k.interpolant == Interpolant::BSpline)
     }
 
     fn parsed(wgsl: &str) -> naga::Module {
@@ -145,7 +156,7 @@ mod tests {
             let module = parsed(&kernel.of_rays());
             let bound =
                 module.global_variables.iter().filter(|(_, v)| v.binding.is_some()).count() as u32;
-            assert_eq!(bound, 3 + u32::from(kernel.nodes) + kernel.slabs, "{kernel:?}");
+            assert_eq!(bound, 3 + u32::from(kernel.nodes) + kernel.slabs.max(1), "{kernel:?}");
         }
     }
 }

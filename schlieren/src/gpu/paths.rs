@@ -2,7 +2,7 @@
 
 use super::cpu_fallback::{BatchTracer, CpuFallback, Failure};
 use super::device::MAX_REOPENINGS;
-use super::kernel::{FIRST_SLAB, Kernel};
+use super::kernel::Kernel;
 use super::volume::{DeviceVolume, VolumeCache};
 use super::work::{GpuCounters, Work};
 
@@ -98,7 +98,7 @@ impl DeviceState {
             interpolant,
             opd: options.quantities.opd,
             nodes: volume.kinds.is_some(),
-            slabs: volume.slabs.len() as u32,
+            slabs: volume.values.slabs() as u32,
         };
         let pipeline = gpu.pipeline(kernel.of_rays(), "march")?;
         Ok(DeviceState { gpu, number, kernel, pipeline, volume, idle: Mutex::default() })
@@ -132,15 +132,15 @@ impl DeviceState {
             let output_bytes = capacity * size_of::<RawKernelOutput>();
             let outputs = buffer(output_bytes, BufferUsages::STORAGE | BufferUsages::COPY_SRC);
             let readback = buffer(output_bytes, BufferUsages::MAP_READ | BufferUsages::COPY_DST);
-            let mut bound = vec![(0, &params), (1, &rays), (2, &outputs)];
-            bound.extend(self.volume.kinds.as_ref().map(|k| (3, k)));
-            bound.extend((FIRST_SLAB..).zip(&self.volume.slabs));
+            let mut bound: Vec<_> = [(0, &params), (1, &rays), (2, &outputs)]
+                .into_iter()
+                .chain(self.volume.kinds.as_ref().map(|k| (3, k)))
+                .map(|(binding, b)| (binding, b.as_entire_binding()))
+                .collect();
+            bound.extend(self.volume.values.bindings());
             let entries: Vec<_> = bound
-                .iter()
-                .map(|(binding, b)| wgpu::BindGroupEntry {
-                    binding: *binding,
-                    resource: b.as_entire_binding(),
-                })
+                .into_iter()
+                .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
                 .collect();
             let bindings = self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
                 label: None,
@@ -295,9 +295,10 @@ impl<'a> GpuPaths<'a> {
         self.on_device().volume.bytes
     }
 
-    /// Number of bindings over which the field is divided.
+    /// Number of buffers over which the field is divided; 0 if a driver on the CPU has it as a
+    /// texture.
     pub fn slabs(&self) -> usize {
-        self.on_device().volume.slabs.len()
+        self.on_device().volume.values.slabs()
     }
 
     pub(super) fn params(&self, volume: &DeviceVolume, rays: usize) -> Params {

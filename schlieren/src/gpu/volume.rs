@@ -1,7 +1,7 @@
 //! Copies the field to the device: its nodes or the coefficients of its spline, in slabs of layers
 //! that fit a binding.
 
-use super::kernel::Kernel;
+use super::kernel::{FIRST_SLAB, Kernel};
 use super::{Gpu, GpuError};
 use crate::field::Field;
 use crate::interpolate::{BSpline, Interpolant};
@@ -54,10 +54,39 @@ impl VolumeCache {
     }
 }
 
+/// The numbers of a field on the device.
+pub(super) enum Values {
+    /// Slabs along z. Neighbouring slabs share the layers that cells at their border need.
+    Slabs(Vec<wgpu::Buffer>),
+    /// Coefficients of the spline, a row of four in each texel.
+    Rows(wgpu::TextureView),
+}
+
+impl Values {
+    /// Number of slabs; 0 for rows.
+    pub(super) fn slabs(&self) -> usize {
+        match self {
+            Values::Slabs(slabs) => slabs.len(),
+            Values::Rows(_) => 0,
+        }
+    }
+
+    /// What a kernel binds.
+    pub(super) fn bindings(&self) -> Vec<(u32, wgpu::BindingResource<'_>)> {
+        match self {
+            Values::Slabs(slabs) => {
+                let resources = slabs.iter().map(wgpu::Buffer::as_entire_binding);
+                (FIRST_SLAB..).zip(resources).collect()
+            }
+            Values::Rows(view) => vec![(FIRST_SLAB, wgpu::BindingResource::TextureView(view))],
+        }
+    }
+}
+
 /// A field on the device.
 pub(super) struct DeviceVolume {
-    /// Slabs along z. Neighbouring slabs share the layers that cells at their border need.
-    pub(super) slabs: Vec<wgpu::Buffer>,
+    /// Its nodes or coefficients.
+    pub(super) values: Values,
     /// Kinds of the nodes, two bits each, if not all are gas.
     pub(super) kinds: Option<wgpu::Buffer>,
     /// Strides of neighbours along y and z.
@@ -89,6 +118,20 @@ impl DeviceVolume {
             available,
             adapter: gpu.name(),
         };
+        let words = field.nodes().map(packed);
+        if let Some(w) = words.as_ref().filter(|w| size_of_val(&w[..]) as u64 > gpu.binding_bytes())
+        {
+            let (need, available) =
+                (bytes_of(size_of_val(&w[..]) as u64), bytes_of(gpu.binding_bytes()));
+            return Err(too_large("the mask", need, available));
+        }
+        let kinds = words.map(|w| upload(gpu, bytemuck::cast_slice(&w))).transpose()?;
+        let of_kinds = kinds.as_ref().map_or(0, wgpu::Buffer::size);
+        if let Some(size) = spline.and_then(|_| rows_size(gpu, [nx + 2, ny + 2, nz + 2])) {
+            let values = Values::Rows(upload_rows(gpu, values, size)?);
+            let bytes = of_kinds + 16 * size.iter().map(|n| u64::from(*n)).product::<u64>();
+            return Ok(DeviceVolume { values, kinds, stride, layers: nz - 1, bytes });
+        }
         let Some((count, layers)) =
             cut(nz - 1, halo, 4 * stride[1] as u64, gpu.binding_bytes(), gpu.slabs())
         else {
@@ -97,14 +140,6 @@ impl DeviceVolume {
                 format!("{} bindings of {}", gpu.slabs(), bytes_of(gpu.binding_bytes()));
             return Err(too_large("a field", need, available));
         };
-        let words = field.nodes().map(packed);
-        if let Some(w) = words.as_ref().filter(|w| size_of_val(&w[..]) as u64 > gpu.binding_bytes())
-        {
-            let (need, available) =
-                (bytes_of(size_of_val(&w[..]) as u64), bytes_of(gpu.binding_bytes()));
-            return Err(too_large("the mask", need, available));
-        }
-
         let slabs = (0..count)
             .map(|s| {
                 let first = s * layers;
@@ -112,10 +147,69 @@ impl DeviceVolume {
                 upload(gpu, bytemuck::cast_slice(&values[first * stride[1]..last * stride[1]]))
             })
             .collect::<Result<Vec<_>, _>>()?;
-        let kinds = words.map(|w| upload(gpu, bytemuck::cast_slice(&w))).transpose()?;
-        let bytes = slabs.iter().chain(&kinds).map(wgpu::Buffer::size).sum();
-        Ok(DeviceVolume { slabs, kinds, stride, layers, bytes })
+        let bytes = of_kinds + slabs.iter().map(wgpu::Buffer::size).sum::<u64>();
+        Ok(DeviceVolume { values: Values::Slabs(slabs), kinds, stride, layers, bytes })
     }
+}
+
+/// Memory of rows that a driver on the CPU gets at most. They are four times as large as slabs.
+const MOST_ROW_BYTES: u64 = 1 << 30;
+
+/// Width, height and layers of a texture of rows, for a driver on the CPU. Other drivers read
+/// neighbouring numbers of buffers together anyway.
+fn rows_size(gpu: &Gpu, coefficients: [usize; 3]) -> Option<[u32; 3]> {
+    let [x, y, z] = coefficients;
+    let size = [x - 3, y, z].map(|n| u32::try_from(n).unwrap_or(u32::MAX));
+    let bytes = 16 * (x as u64 - 3) * y as u64 * z as u64;
+    let limits = gpu.device.limits();
+    let fits = size[0].max(size[1]) <= limits.max_texture_dimension_2d
+        && size[2] <= limits.max_texture_array_layers
+        && bytes <= MOST_ROW_BYTES.min(gpu.binding_bytes());
+    (gpu.is_software() && fits).then_some(size)
+}
+
+/// Uploads coefficients, four in each texel.
+fn upload_rows(
+    gpu: &Gpu,
+    coefficients: &[f32],
+    [width, height, layers]: [u32; 3],
+) -> Result<wgpu::TextureView, GpuError> {
+    let (columns, rows) = (width as usize + 3, height as usize);
+    gpu.checked(|| {
+        let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("field"),
+            size: wgpu::Extent3d { width, height, depth_or_array_layers: layers },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: wgpu::TextureFormat::Rgba32Float,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+            view_formats: &[],
+        });
+        let mut texels = Vec::with_capacity(width as usize * rows);
+        for (z, layer) in (0..layers).zip(coefficients.chunks(columns * rows)) {
+            texels.clear();
+            for row in layer.chunks(columns) {
+                texels.extend(row.windows(4).map(|w| [w[0], w[1], w[2], w[3]]));
+            }
+            let origin = wgpu::Origin3d { x: 0, y: 0, z };
+            gpu.queue.write_texture(
+                wgpu::TexelCopyTextureInfo { origin, ..texture.as_image_copy() },
+                bytemuck::cast_slice(&texels),
+                wgpu::TexelCopyBufferLayout {
+                    offset: 0,
+                    bytes_per_row: Some(16 * width),
+                    rows_per_image: None,
+                },
+                wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+            );
+        }
+        gpu.queue.submit([]);
+        texture.create_view(&wgpu::TextureViewDescriptor {
+            dimension: Some(wgpu::TextureViewDimension::D2Array),
+            ..Default::default()
+        })
+    })
 }
 
 /// Number of slabs and layers of cells in each, so that every slab fits a binding. The last slab

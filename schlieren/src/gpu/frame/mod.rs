@@ -23,7 +23,6 @@ mod shader;
 mod technique;
 
 use super::cpu_fallback::Failure;
-use super::kernel::FIRST_SLAB;
 use super::paths::DeviceState;
 use super::{GpuError, GpuPaths};
 use crate::film::beams::corner_of_cells;
@@ -168,7 +167,7 @@ impl GpuPaths<'_> {
             + u32::from(image > 0)
             + u32::from(exposure.solids.is_some())
             + u32::from(on_device.volume.kinds.is_some())
-            + on_device.volume.slabs.len() as u32;
+            + on_device.volume.values.slabs() as u32;
         if buffers > on_device.gpu.storage_buffers() {
             return Err(refused(format!(
                 "it takes {buffers} buffers, and a kernel of the device has {}",
@@ -304,16 +303,16 @@ impl<'a> FrameOnDevice<'a> {
             .map(|_| gpu.checked(|| gpu.buffer(4 * rays.div_ceil(32), storage | to_device)))
             .transpose()?;
         paths.work.add_to_device(march.size());
-        let mut of_march = vec![(0, &march)];
-        of_march.extend(on_device.volume.kinds.as_ref().map(|k| (3, k)));
-        of_march.extend((FIRST_SLAB..).zip(&on_device.volume.slabs));
+        let mut of_march = vec![(0, march.as_entire_binding())];
+        of_march.extend(on_device.volume.kinds.as_ref().map(|k| (3, k.as_entire_binding())));
+        of_march.extend(on_device.volume.values.bindings());
         let mut kernels = Vec::new();
         match job.light {
             Light::Photons { .. } => {
                 let pipeline = gpu.pipeline(shader.photons(), "photons")?;
-                let mut own = vec![(0, &frame), (1, &film)];
-                own.extend(image.as_ref().map(|i| (3, i)));
-                own.extend(bodies.as_ref().map(|b| (4, b)));
+                let mut own = vec![(0, frame.as_entire_binding()), (1, film.as_entire_binding())];
+                own.extend(image.as_ref().map(|i| (3, i.as_entire_binding())));
+                own.extend(bodies.as_ref().map(|b| (4, b.as_entire_binding())));
                 let groups = gpu.bind(&pipeline, [&of_march, &own])?;
                 kernels.push((pipeline, groups));
             }
@@ -323,13 +322,15 @@ impl<'a> FrameOnDevice<'a> {
                 let words = rays * (2 + layout.channels());
                 let corners = gpu.checked(|| gpu.buffer(4 * words, storage))?;
                 let pipeline = gpu.pipeline(shader.corners(), "trace_corners")?;
-                let mut own = vec![(0, &frame), (2, &corners)];
-                own.extend(image.as_ref().map(|i| (3, i)));
-                own.extend(bodies.as_ref().map(|b| (4, b)));
+                let mut own =
+                    vec![(0, frame.as_entire_binding()), (2, corners.as_entire_binding())];
+                own.extend(image.as_ref().map(|i| (3, i.as_entire_binding())));
+                own.extend(bodies.as_ref().map(|b| (4, b.as_entire_binding())));
                 let groups = gpu.bind(&pipeline, [&of_march, &own])?;
                 kernels.push((pipeline, groups));
                 let pipeline = gpu.pipeline(shader.triangles(), "distribute_cells")?;
-                let own = [(0, &frame), (1, &film), (2, &corners)];
+                let own = [(0, &frame), (1, &film), (2, &corners)]
+                    .map(|(i, b)| (i, b.as_entire_binding()));
                 let groups = gpu.bind(&pipeline, [&[], &own])?;
                 kernels.push((pipeline, groups));
             }
