@@ -38,6 +38,7 @@ mod program_ranks;
 mod python;
 mod shock_angles;
 mod smpi;
+mod speed_gpu;
 mod speed_schlieren;
 mod strong_scaling;
 mod table4_1;
@@ -301,6 +302,13 @@ pub const ALL: &[Experiment] = &[
         chapter: 5,
         title: "Time at equal error against the dissertation’s method",
         run: baselines_schlieren::run,
+    },
+    Experiment {
+        id: "speed-gpu",
+        chapter: 5,
+        title: "Whole frames on a GPU: frames per second, bytes moved, and how far the picture is \
+                from the CPU's",
+        run: speed_gpu::run,
     },
     Experiment {
         id: "speed-schlieren",
