@@ -539,3 +539,27 @@ fn a_gpu_that_is_not_there() {
     assert!(stderr.contains("on the CPU"), "{stderr}");
     assert!(Path::new(&path("auto.png")).exists());
 }
+
+/// With a Vulkan device, the report tells what a frame moved.
+#[test]
+fn the_work_of_a_gpu_is_in_the_report() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = |name: &str| dir.path().join(name).to_str().unwrap().to_string();
+    flow_of(&dir.path().join("flow.vti"), [33, 17]);
+    let (file, png) = (path("flow.vti"), path("a.png"));
+    let base = ["--density", "rho", "--size", "40x20", "-o", &png, "--json", "--quiet"];
+    let run = |device| {
+        let o = schlieren(&[&["render", &file, "--device", device], &base[..]].concat());
+        (o.status.code(), text(&o.stdout), text(&o.stderr))
+    };
+    assert!(serde_json::from_str::<Value>(&run("cpu").1).unwrap()["device"].is_null());
+    let (code, out, err) = run("gpu");
+    if code != Some(0) && err.contains("no GPU") {
+        assert!(std::env::var_os("RTSV_REQUIRE_PEERS").is_none_or(|v| v != "1"), "{err}");
+        return;
+    }
+    let object: Value = serde_json::from_str(&out).unwrap_or_else(|e| panic!("{e}: {out} {err}"));
+    assert_eq!(object["device"]["photons"], object["photons"]["sent"], "{object}");
+    // 800 pixels of 8 bytes, the outcomes, and the rays of the margin.
+    assert_eq!(object["device"]["bytes_from_device"], 800 * 8 + 48 + 4096 * 32);
+}

@@ -218,6 +218,7 @@ pub(super) fn render_and_write(
         "effects": r.effects,
         "counters": r.counters,
         "photons": r.tally,
+        "device": r.device,
         "margin_px": r.margin_px,
         "silhouette_error_px": r.silhouette_error_px,
         "seconds": { "read": read_secs, "render": render_secs },

@@ -173,8 +173,8 @@ pub(super) fn on_gpu<'a>(
     }
 }
 
-/// Exposes films by photons where the paths are, if that is a GPU that can: `Ok(None)` where the CPU
-/// must. A warning says why the GPU cannot.
+/// Exposes films by photons where the paths are, if that is a GPU that can: `Ok(None)` where the
+/// CPU must. A warning says why the GPU cannot.
 pub(super) fn expose_photons<const C: usize>(
     planned: &PlannedPaths<'_>,
     setup: &Exposure<'_>,

@@ -181,10 +181,9 @@ impl TestSection {
         Ok(TestSection { fields, cells, view, solids, media: None, input, warnings, caches })
     }
 
-    /// Keeps what marches compute from the fields (splines, projections), and the fields on a GPU, for
-    /// further images. This
-    /// takes as much memory as the fields again, and a second image then takes only the time of its
-    /// light. Fields must not be replaced after this.
+    /// Keeps what marches compute from the fields (splines, projections), and the fields on a GPU,
+    /// for further images. This takes as much memory as the fields again, and a second image then
+    /// takes only the time of its light. Fields must not be replaced after this.
     #[must_use]
     pub fn with_caches(mut self) -> TestSection {
         self.caches = self.fields.iter().map(|_| Caches::default()).collect();

@@ -1,0 +1,304 @@
+//! A frame's buffers and kernels on a device, and the submissions of its parts.
+
+use super::film::FilmLayout;
+use super::params::FrameParams;
+use super::shader::FrameShader;
+use super::{Job, Light};
+use crate::film::beams::corner_of_cells;
+use crate::gpu::paths::DeviceState;
+use crate::gpu::{Gpu, GpuError, GpuPaths};
+use rayon::prelude::*;
+use std::collections::VecDeque;
+use std::ops::Range;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use wgpu::BufferUsages;
+
+/// Number of photons or corners in a submission: enough to fill any device, and few enough that no
+/// driver assumes that the device hangs.
+const PER_SUBMISSION: usize = 1 << 18;
+/// Pixels of a tile, which is a work group.
+const TILE: usize = 64;
+/// Side of a tile.
+const SIDE: u32 = 8;
+/// Submissions in flight: one is prepared while the device works on the other.
+const IN_FLIGHT: usize = 2;
+/// Largest number of work groups along an axis.
+const MOST_GROUPS: usize = 65_535;
+
+/// A frame's buffers and kernels on a device.
+pub(super) struct FrameOnDevice<'a> {
+    gpu: Arc<Gpu>,
+    params: FrameParams,
+    layout: FilmLayout,
+    frame: wgpu::Buffer,
+    film: wgpu::Buffer,
+    /// Bits of the rays of a submission that bodies stop.
+    bodies: Option<wgpu::Buffer>,
+    /// Kernels with what is bound to them, in the order in which they run.
+    kernels: Vec<(wgpu::ComputePipeline, [wgpu::BindGroup; 2])>,
+    in_flight: VecDeque<(wgpu::SubmissionIndex, u64)>,
+    progress: &'a (dyn Fn(u64) + Sync),
+}
+
+impl<'a> FrameOnDevice<'a> {
+    pub(super) fn new(
+        paths: &GpuPaths<'_>,
+        on_device: &DeviceState,
+        job: &Job<'a>,
+    ) -> Result<FrameOnDevice<'a>, GpuError> {
+        let Job { exposure, technique, layout, .. } = job;
+        let from_film = exposure.technique.samples_from_film();
+        let optics = exposure.technique.optics();
+        let mut params = FrameParams::new(
+            &paths.frame,
+            &job.framing,
+            optics,
+            paths.field.n0(),
+            paths.options.step_voxels,
+            exposure.margin_px,
+            from_film,
+        );
+        params.seed = [exposure.seed as u32, (exposure.seed >> 32) as u32];
+        (params.counts, params.outcomes) = (layout.counts() as u32, layout.outcomes() as u32);
+        (params.technique, params.dots_seed) = (technique.numbers, technique.dots_seed);
+        let needs_source = exposure.tilted_beams || exposure.technique.needs_source_points();
+        let shader = FrameShader {
+            march: on_device.kernel,
+            technique,
+            channels: layout.channels(),
+            tilted_beams: exposure.tilted_beams,
+            from_film,
+            counts: layout.has_counts(),
+            bodies: exposure.solids.is_some(),
+            sampling: exposure.sampling,
+            source: needs_source.then(|| optics.source_image()),
+        };
+
+        let of_march = paths.params(&on_device.volume, 0);
+        let of_march = bytemuck::bytes_of(&of_march);
+        let gpu = Arc::clone(&on_device.gpu);
+        let (storage, to_device) = (BufferUsages::STORAGE, BufferUsages::COPY_DST);
+        let made = gpu.checked(|| {
+            let frame = gpu.buffer(size_of::<FrameParams>(), BufferUsages::UNIFORM | to_device);
+            // New buffers are zero.
+            let film = gpu.buffer(4 * layout.words(), storage | BufferUsages::COPY_SRC);
+            let march = gpu.buffer(of_march.len(), BufferUsages::UNIFORM | to_device);
+            gpu.queue.write_buffer(&march, 0, of_march);
+            let image = technique.image.map(|i| {
+                let buffer = gpu.buffer(size_of_val(i.pixels()), storage | to_device);
+                gpu.queue.write_buffer(&buffer, 0, bytemuck::cast_slice(i.pixels()));
+                paths.work.add_to_device(buffer.size());
+                buffer
+            });
+            (frame, film, march, image)
+        })?;
+        let (frame, film, march, image) = made;
+        let rays = match job.light {
+            Light::Photons { .. } => PER_SUBMISSION,
+            Light::Beams { per_side } => {
+                let columns = job.columns(per_side);
+                columns * (rows_at_once(columns) + 1)
+            }
+        };
+        let bodies = exposure
+            .solids
+            .map(|_| gpu.checked(|| gpu.buffer(4 * rays.div_ceil(32), storage | to_device)))
+            .transpose()?;
+        paths.work.add_to_device(march.size());
+        let mut of_march = vec![(0, march.as_entire_binding())];
+        of_march.extend(on_device.volume.kinds.as_ref().map(|k| (3, k.as_entire_binding())));
+        of_march.extend(on_device.volume.values.bindings());
+        let mut kernels = Vec::new();
+        match job.light {
+            Light::Photons { .. } => {
+                let pipeline = gpu.pipeline(shader.photons(), "photons")?;
+                let mut own = vec![(0, frame.as_entire_binding()), (1, film.as_entire_binding())];
+                own.extend(image.as_ref().map(|i| (3, i.as_entire_binding())));
+                own.extend(bodies.as_ref().map(|b| (4, b.as_entire_binding())));
+                let groups = gpu.bind(&pipeline, [&of_march, &own])?;
+                kernels.push((pipeline, groups));
+            }
+            Light::Beams { per_side } => {
+                params.per_row = job.columns(per_side) as u32;
+                params.parts = per_side;
+                let words = rays * (2 + layout.channels());
+                let corners = gpu.checked(|| gpu.buffer(4 * words, storage))?;
+                let pipeline = gpu.pipeline(shader.corners(), "trace_corners")?;
+                let mut own =
+                    vec![(0, frame.as_entire_binding()), (2, corners.as_entire_binding())];
+                own.extend(image.as_ref().map(|i| (3, i.as_entire_binding())));
+                own.extend(bodies.as_ref().map(|b| (4, b.as_entire_binding())));
+                let groups = gpu.bind(&pipeline, [&of_march, &own])?;
+                kernels.push((pipeline, groups));
+                let pipeline = gpu.pipeline(shader.triangles(), "distribute_cells")?;
+                let own = [(0, &frame), (1, &film), (2, &corners)]
+                    .map(|(i, b)| (i, b.as_entire_binding()));
+                let groups = gpu.bind(&pipeline, [&[], &own])?;
+                kernels.push((pipeline, groups));
+            }
+        }
+        let (layout, progress) = (*layout, job.progress);
+        let in_flight = VecDeque::new();
+        Ok(FrameOnDevice { gpu, params, layout, frame, film, bodies, kernels, in_flight, progress })
+    }
+
+    /// Returns false when it was cancelled.
+    pub(super) fn send_photons(
+        &mut self,
+        paths: &GpuPaths<'_>,
+        job: &Job<'_>,
+        passes: Range<u32>,
+    ) -> Result<bool, GpuError> {
+        let [width, height] = job.area();
+        let (per_row, rows) = (width.div_ceil(SIDE.into()), height.div_ceil(SIDE.into()));
+        let per_pass = per_row * rows;
+        (self.params.per_row, self.params.per_pass) = (per_row as u32, per_pass as u32);
+        self.params.parts = self.layout.films() as u32;
+        let tiles = per_pass * passes.len() as u64;
+        let photons = width * height * passes.len() as u64;
+        let photons_of = |tiles_done: u64| {
+            (u128::from(photons) * u128::from(tiles_done) / u128::from(tiles)) as u64
+        };
+        let mut first = 0;
+        while first < tiles {
+            let count = (tiles - first).min((PER_SUBMISSION / TILE) as u64);
+            self.params.first = (first % per_pass) as u32;
+            self.params.first_pass = passes.start + (first / per_pass) as u32;
+            let sent = photons_of(first + count) - photons_of(first);
+            if let Some(bodies) = &self.bodies {
+                let place = |tile: u64, lane: u32| {
+                    let (in_pass, margin) = (tile % per_pass, i64::from(job.exposure.margin_px));
+                    let x = in_pass % per_row * u64::from(SIDE) + u64::from(lane % SIDE);
+                    let y = in_pass / per_row * u64::from(SIDE) + u64::from(lane / SIDE);
+                    let pass = passes.start + (tile / per_pass) as u32;
+                    job.exposure
+                        .send(&job.framing, [x as i64 - margin, y as i64 - margin], pass)
+                        .start
+                };
+                let bits = bits(count as usize * TILE, |ray| {
+                    let tile = first + (ray / TILE) as u64;
+                    job.exposure.is_behind_body(&place(tile, (ray % TILE) as u32))
+                });
+                self.write(paths, bodies, &bits);
+            }
+            if !self.submit(paths, &[[count as u32, 1]], sent, job.cancel)? {
+                return Ok(false);
+            }
+            first += count;
+        }
+        Ok(true)
+    }
+
+    /// Returns false when it was cancelled.
+    pub(super) fn send_beams(
+        &mut self,
+        paths: &GpuPaths<'_>,
+        job: &Job<'_>,
+        per_side: u32,
+    ) -> Result<bool, GpuError> {
+        let columns = self.params.per_row as usize;
+        let rows = job.area()[1] as usize * per_side as usize;
+        let at_once = rows_at_once(columns);
+        for first in (0..rows).step_by(at_once) {
+            let count = at_once.min(rows - first);
+            (self.params.first, self.params.per_pass) = (first as u32, count as u32);
+            if let Some(bodies) = &self.bodies {
+                let bits = bits((count + 1) * columns, |ray| {
+                    let at = [ray % columns, first + ray / columns];
+                    job.exposure.is_behind_body(&corner_of_cells(
+                        job.exposure,
+                        &job.framing,
+                        at,
+                        per_side,
+                    ))
+                });
+                self.write(paths, bodies, &bits);
+            }
+            let across = columns.div_ceil(TILE) as u32;
+            let groups = [[across, count as u32 + 1], [across, count as u32]];
+            if !self.submit(paths, &groups, (count * columns) as u64, job.cancel)? {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    /// Runs the kernels with these numbers of work groups. Returns false when it was cancelled.
+    fn submit(
+        &mut self,
+        paths: &GpuPaths<'_>,
+        groups: &[[u32; 2]],
+        rays: u64,
+        cancel: &AtomicBool,
+    ) -> Result<bool, GpuError> {
+        while self.in_flight.len() >= IN_FLIGHT {
+            self.wait_for_first()?;
+        }
+        if cancel.load(Ordering::Relaxed) {
+            return Ok(false);
+        }
+        let gpu = &self.gpu;
+        gpu.queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&self.params));
+        paths.work.add_to_device(self.frame.size());
+        let mut commands = gpu.device.create_command_encoder(&Default::default());
+        {
+            let mut pass = commands.begin_compute_pass(&Default::default());
+            for ((pipeline, bound), [x, y]) in self.kernels.iter().zip(groups) {
+                pass.set_pipeline(pipeline);
+                pass.set_bind_group(0, &bound[0], &[]);
+                pass.set_bind_group(1, &bound[1], &[]);
+                pass.dispatch_workgroups(*x, *y, 1);
+            }
+        }
+        let index = gpu.queue.submit([commands.finish()]);
+        paths.work.add_submission(groups.len() as u64);
+        self.in_flight.push_back((index, rays));
+        Ok(true)
+    }
+
+    /// Writes to a buffer before the next submission.
+    fn write(&self, paths: &GpuPaths<'_>, buffer: &wgpu::Buffer, words: &[u32]) {
+        self.gpu.queue.write_buffer(buffer, 0, bytemuck::cast_slice(words));
+        paths.work.add_to_device(size_of_val(words) as u64);
+    }
+
+    fn wait_for_first(&mut self) -> Result<(), GpuError> {
+        if let Some((index, rays)) = self.in_flight.pop_front() {
+            self.gpu.wait(index)?;
+            self.gpu.mark_batch_finished();
+            (self.progress)(rays);
+        }
+        Ok(())
+    }
+
+    /// Waits for the film and reads its words.
+    pub(super) fn read(mut self, paths: &GpuPaths<'_>) -> Result<Vec<u32>, GpuError> {
+        let bytes = self.film.size();
+        let gpu = Arc::clone(&self.gpu);
+        let usage = BufferUsages::MAP_READ | BufferUsages::COPY_DST;
+        let readback = gpu.checked(|| gpu.buffer(bytes as usize, usage))?;
+        let mut commands = gpu.device.create_command_encoder(&Default::default());
+        commands.copy_buffer_to_buffer(&self.film, 0, &readback, 0, bytes);
+        gpu.queue.submit([commands.finish()]);
+        while !self.in_flight.is_empty() {
+            self.wait_for_first()?;
+        }
+        let words = gpu.read(&readback)?;
+        paths.work.add_from_device(bytes);
+        Ok(words)
+    }
+}
+
+/// One bit for each of so many rays, from the lowest of the first word.
+fn bits(rays: usize, is_set: impl Fn(usize) -> bool + Sync) -> Vec<u32> {
+    let word = |w: usize| {
+        (32 * w..rays.min(32 * w + 32)).fold(0, |a, ray| a | u32::from(is_set(ray)) << (ray % 32))
+    };
+    (0..rays.div_ceil(32)).into_par_iter().map(word).collect()
+}
+
+/// Rows of cells in a submission, for rows of this many corners.
+fn rows_at_once(columns: usize) -> usize {
+    (PER_SUBMISSION / columns).clamp(1, MOST_GROUPS - 1)
+}
