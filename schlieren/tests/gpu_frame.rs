@@ -221,6 +221,46 @@ fn only_pixels_come_back_and_each_part_of_a_frame_is_submitted_once() {
     let rays = 4096 * 64 + 96;
     let frames = work.submissions - 1;
     assert_eq!(work.bytes_to_device, flow + rays + 96 + frames * 336, "{work:?}");
+
+    // The picture alone is filtered on the device.
+    let scene = scene("gpu", "", &rest);
+    let section = TestSection::of_fields(&scene, vec![field], None).unwrap();
+    let out = render(&scene, &section, Layers::NONE, &Control::default()).unwrap();
+    let picture = out.report.device.unwrap();
+    assert_eq!(picture.submissions, work.submissions + 1);
+    assert_eq!(picture.bytes_from_device, 41 * 30 * 4 + 48 + 4096 * 32);
+}
+
+/// The filters of the device are those of the CPU, also where they reach over the image's edge.
+#[test]
+fn pictures_are_filtered_on_the_device_as_on_the_cpu() {
+    if !has_gpu() {
+        return;
+    }
+    let field = cube(24, lopsided);
+    let color = "[technique]\nkind = \"schlieren\"\n[technique.cutoff]\nkind = \
+                 \"color\"\nradius_m = 2e-3\n";
+    let source = "[light.source]\nkind = \"point\"\n";
+    for technique in [KNIFE.to_string(), format!("{color}{source}")] {
+        for filter in [
+            "kind = \"gaussian\"\nsigma_px = 1.7",
+            "kind = \"gaussian\"\nsigma_px = 30.0",
+            "kind = \"mean\"\nradius_px = 2.4",
+            "kind = \"none\"",
+        ] {
+            let rest = format!("{technique}{PHOTONS}[sampling.filter]\n{filter}\n");
+            let [gpu, cpu] = ["gpu", "cpu"].map(|d| {
+                let scene = scene(d, "", &rest);
+                let section = TestSection::of_fields(&scene, vec![field.clone()], None).unwrap();
+                render(&scene, &section, Layers::NONE, &Control::default()).unwrap()
+            });
+            assert_eq!(gpu.report.warnings, cpu.report.warnings, "{filter}");
+            assert_eq!(gpu.report.tally, cpu.report.tally, "{filter}");
+            assert_eq!(gpu.report.counters, cpu.report.counters, "{filter}");
+            let [worst, brightest] = difference(&gpu, &cpu);
+            assert!(brightest > 0.3 && worst < 2e-5, "{filter}: {worst:e} of {brightest}");
+        }
+    }
 }
 
 /// The sums of integers do not depend on the order in which photons arrive.

@@ -50,6 +50,17 @@ impl Filter {
         }
     }
 
+    /// Weights by distance along rows and columns; `None` for a cone, which has none.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn weights(self) -> Option<Vec<f64>> {
+        match self {
+            Filter::None => Some(vec![1.0]),
+            Filter::Gaussian { sigma_px } => Some(gaussian::weights(sigma_px)),
+            Filter::Mean { radius_px } => Some(mean::weights(radius_px)),
+            Filter::Cone { .. } => None,
+        }
+    }
+
     /// The name on the command line.
     pub fn name(self) -> &'static str {
         match self {

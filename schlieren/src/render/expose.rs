@@ -8,7 +8,7 @@ use super::{
 };
 use crate::film::beams::expose_beams;
 use crate::film::photons::{ExposedFilm, Exposure, LandedPhoton, expose};
-use crate::film::{Film, Framing};
+use crate::film::{Film, Framing, Tally};
 use crate::filter::Filter;
 use crate::optics::{Optics, SourceImage};
 use crate::path::{Exit, LightPaths, PathQuantities, Start};
@@ -158,28 +158,31 @@ fn expose_line<const C: usize>(
     let film = match scene.sampling() {
         SamplingSpec::Beams { cells_per_side } => {
             let total = per_pass * u64::from(cells_per_side).pow(2);
-            let film = Film::<C>::new(framing, false);
             let progress = |n| finished(total, n);
             let control = FilmControl { cancel, progress: &progress };
-            let by_gpu = on_gpu::expose_beams(
+            let by_gpu = on_gpu::photograph_beams(
                 planned,
                 setup,
-                &film,
+                framing,
                 cells_per_side,
                 &control,
                 &mut r.report,
             )?;
-            let tally = match by_gpu {
-                Some(tally) => tally,
-                None => expose_beams(setup, &film, cells_per_side, cancel, &progress)
-                    .ok_or(RenderError::Cancelled)?,
+            let (picture, tally) = match by_gpu {
+                Some(made) => made,
+                None => {
+                    let film = Film::<C>::new(framing, false);
+                    let tally = expose_beams(setup, &film, cells_per_side, cancel, &progress)
+                        .ok_or(RenderError::Cancelled)?;
+                    (film.to_pixels(1.0), tally)
+                }
             };
             r.report.tally.add(&tally);
             let rays = done.load(Ordering::Relaxed);
             r.report.counters.differential_rays += rays;
             r.report.counters.rays += rays;
             r.report.counters.solid_queries += if setup.solids.is_some() { rays } else { 0 };
-            film.to_pixels(1.0)
+            picture
         }
         SamplingSpec::Photons { samples, filter, .. } => {
             let filter = filter.filter().shrunk(samples);
@@ -190,10 +193,24 @@ fn expose_line<const C: usize>(
                 return Err(RenderError::TooManyPhotons { photons: total, limit });
             }
             let two = layers.noise && samples > 1;
-            let films: Vec<Film<C>> =
-                (0..if two { 2 } else { 1 }).map(|_| Film::new(framing, layers.counts)).collect();
             let progress = |n| finished(total, n);
             let control = FilmControl { cancel, progress: &progress };
+            if !(two || layers.counts) {
+                let by_gpu = on_gpu::photograph_photons(
+                    planned,
+                    setup,
+                    framing,
+                    (samples, filter),
+                    &control,
+                    &mut r.report,
+                )?;
+                if let Some((picture, tally)) = by_gpu {
+                    add_photons(&mut r.report, &tally, setup);
+                    return Ok(picture);
+                }
+            }
+            let films: Vec<Film<C>> =
+                (0..if two { 2 } else { 1 }).map(|_| Film::new(framing, layers.counts)).collect();
             let by_gpu = match keep {
                 true => {
                     on_gpu::warn_of_cone_filter(planned, &mut r.report);
@@ -213,10 +230,7 @@ fn expose_line<const C: usize>(
                 None => expose(setup, &films, 0..samples, keep, cancel, &progress)
                     .ok_or(RenderError::Cancelled)?,
             };
-            r.report.tally.add(&exposed.tally);
-            r.report.counters.rays += exposed.tally.sent - exposed.tally.blocked_by_solids;
-            r.report.counters.solid_queries +=
-                if setup.solids.is_some() { exposed.tally.sent } else { 0 };
+            add_photons(&mut r.report, &exposed.tally, setup);
             if two {
                 r.noise = Some(noise(&films, samples, filter, scene.exposure()));
             }
@@ -236,6 +250,13 @@ fn expose_line<const C: usize>(
         }
     };
     Ok(film)
+}
+
+/// Notes the photons of a line.
+fn add_photons(report: &mut Report, tally: &Tally, setup: &Exposure<'_>) {
+    report.tally.add(tally);
+    report.counters.rays += tally.sent - tally.blocked_by_solids;
+    report.counters.solid_queries += if setup.solids.is_some() { tally.sent } else { 0 };
 }
 
 /// Filters the noise of a film.

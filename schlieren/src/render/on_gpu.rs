@@ -7,7 +7,8 @@ use super::section::Caches;
 use super::{RenderError, Report};
 use crate::field::Field;
 use crate::film::photons::Exposure;
-use crate::film::{Film, Tally};
+use crate::film::{Film, Framing, Tally};
+use crate::filter::Filter;
 use crate::plan::Request;
 use crate::scene::{Device, MarchSpec};
 use crate::view::View;
@@ -173,8 +174,51 @@ pub(super) fn on_gpu<'a>(
     }
 }
 
-/// Exposes films by photons where the paths are, if that is a GPU that can: `Ok(None)` where the
+/// Brightness of each pixel, and what became of the light.
+pub(super) type Picture<const C: usize> = (Vec<[f32; C]>, Tally);
+
+/// A picture by photons, made where the paths are, if that is a GPU that can: `Ok(None)` where the
 /// CPU must. A warning says why the GPU cannot.
+pub(super) fn photograph_photons<const C: usize>(
+    planned: &PlannedPaths<'_>,
+    setup: &Exposure<'_>,
+    framing: Framing,
+    (samples, filter): (u32, Filter),
+    control: &FilmControl<'_>,
+    report: &mut Report,
+) -> Result<Option<Picture<C>>, RenderError> {
+    #[cfg(feature = "gpu")]
+    if let (Some(device), Some(filter)) = (&planned.on_device, filter.weights()) {
+        let FilmControl { cancel, progress } = *control;
+        return exposed(
+            device.photograph_photons(setup, framing, 0..samples, &filter, cancel, progress),
+            report,
+        );
+    }
+    let _ = (planned, setup, framing, samples, filter, control, report);
+    Ok(None)
+}
+
+/// As [`photograph_photons`], by beams.
+pub(super) fn photograph_beams<const C: usize>(
+    planned: &PlannedPaths<'_>,
+    setup: &Exposure<'_>,
+    framing: Framing,
+    per_side: u32,
+    control: &FilmControl<'_>,
+    report: &mut Report,
+) -> Result<Option<Picture<C>>, RenderError> {
+    #[cfg(feature = "gpu")]
+    if let Some(device) = &planned.on_device {
+        let FilmControl { cancel, progress } = *control;
+        let picture = device.photograph_beams(setup, framing, per_side, cancel, progress);
+        return exposed(picture, report);
+    }
+    let _ = (planned, setup, framing, per_side, control, report);
+    Ok(None)
+}
+
+/// Exposes films by photons where the paths are, as [`photograph_photons`]. The CPU filters them.
 pub(super) fn expose_photons<const C: usize>(
     planned: &PlannedPaths<'_>,
     setup: &Exposure<'_>,
@@ -192,24 +236,6 @@ pub(super) fn expose_photons<const C: usize>(
     Ok(None)
 }
 
-/// As [`expose_photons`], by beams.
-pub(super) fn expose_beams<const C: usize>(
-    planned: &PlannedPaths<'_>,
-    setup: &Exposure<'_>,
-    film: &Film<C>,
-    per_side: u32,
-    control: &FilmControl<'_>,
-    report: &mut Report,
-) -> Result<Option<Tally>, RenderError> {
-    #[cfg(feature = "gpu")]
-    if let Some(device) = &planned.on_device {
-        let FilmControl { cancel, progress } = *control;
-        return exposed(device.expose_beams(setup, film, per_side, cancel, progress), report);
-    }
-    let _ = (planned, setup, film, per_side, control, report);
-    Ok(None)
-}
-
 /// Cancels an exposure and reports its progress.
 #[derive(Clone, Copy)]
 #[cfg_attr(not(feature = "gpu"), expect(dead_code, reason = "nothing else exposes elsewhere"))]
@@ -220,13 +246,13 @@ pub(super) struct FilmControl<'a> {
 }
 
 #[cfg(feature = "gpu")]
-fn exposed(
-    result: Result<Tally, crate::gpu::NotExposed>,
+fn exposed<T>(
+    result: Result<T, crate::gpu::NotExposed>,
     report: &mut Report,
-) -> Result<Option<Tally>, RenderError> {
+) -> Result<Option<T>, RenderError> {
     use crate::gpu::NotExposed;
     match result {
-        Ok(tally) => Ok(Some(tally)),
+        Ok(made) => Ok(Some(made)),
         Err(NotExposed::Cancelled) => Err(RenderError::Cancelled),
         Err(NotExposed::Refused(why)) => {
             let warning = film_on_cpu(&why);
@@ -244,7 +270,7 @@ pub(super) fn warn_of_cone_filter(planned: &PlannedPaths<'_>, report: &mut Repor
     if planned.on_device.is_some() {
         let refused = crate::gpu::NotExposed::Refused("the cone filter keeps every photon".into());
         // A refusal is no error.
-        let _ = exposed(Err(refused), report);
+        let _ = exposed::<()>(Err(refused), report);
     }
     let _ = (planned, report);
 }

@@ -1,6 +1,6 @@
 //! The film on the device: its layout, and its way back.
 
-use crate::film::{Film, Tally};
+use crate::film::{Film, Framing, Tally};
 
 /// Outcomes that film.wgsl counts, in its order.
 const OUTCOMES: usize = 6;
@@ -22,6 +22,21 @@ impl FilmLayout {
             films: films.len(),
             counts: films[0].has_counts(),
         }
+    }
+
+    /// The film of a picture that is filtered on the device.
+    pub(super) fn of_picture<const C: usize>(framing: &Framing) -> FilmLayout {
+        FilmLayout { pixels: framing.pixels(), channels: C, films: 1, counts: false }
+    }
+
+    /// Bytes of a picture.
+    pub(super) fn picture_bytes(&self) -> u64 {
+        4 * (self.pixels * self.channels) as u64
+    }
+
+    /// Bytes of the outcomes, and where they begin.
+    pub(super) fn outcome_bytes(&self) -> [u64; 2] {
+        [4 * self.outcomes() as u64, 8 * OUTCOMES as u64]
     }
 
     pub(super) fn channels(&self) -> usize {
@@ -52,14 +67,14 @@ impl FilmLayout {
     }
 }
 
-/// Adds what came back to the films. Returns the counts of outcomes but [`Tally::sent`], and the
-/// number of steps.
-pub(super) fn add_to_films<const C: usize>(
-    layout: FilmLayout,
-    words: &[u32],
-    films: &[Film<C>],
-) -> (Tally, u64) {
-    let sum = |at: usize| u64::from(words[at]) | u64::from(words[at + 1]) << 32;
+/// The sum in two words.
+fn sum_of(words: &[u32], at: usize) -> u64 {
+    u64::from(words[at]) | u64::from(words[at + 1]) << 32
+}
+
+/// Adds what came back to the films.
+pub(super) fn add_to_films<const C: usize>(layout: FilmLayout, words: &[u32], films: &[Film<C>]) {
+    let sum = |at: usize| sum_of(words, at);
     for (f, film) in films.iter().enumerate() {
         for pixel in 0..layout.pixels {
             let at = 2 * C * (f * layout.pixels + pixel);
@@ -69,8 +84,19 @@ pub(super) fn add_to_films<const C: usize>(
             film.add(pixel, std::array::from_fn(|c| sum(at + 2 * c)), photons);
         }
     }
+}
+
+/// The picture that came back.
+pub(super) fn picture<const C: usize>(words: &[u32]) -> Vec<[f32; C]> {
+    let (pixels, _) = words.split_at(words.len() - 2 * OUTCOMES);
+    pixels.chunks_exact(C).map(|p| std::array::from_fn(|c| f32::from_bits(p[c]))).collect()
+}
+
+/// Counts of outcomes but [`Tally::sent`], and the number of steps: the last of what came back.
+pub(super) fn outcomes(words: &[u32]) -> (Tally, u64) {
+    let first = words.len() - 2 * OUTCOMES;
     let [stopped, not_a_number, landed, on_film, steps, blocked_by_solids] =
-        [0, 1, 2, 3, 4, 5].map(|i| sum(layout.outcomes() + 2 * i));
+        [0, 1, 2, 3, 4, 5].map(|i| sum_of(words, first + 2 * i));
     let tally = Tally {
         blocked_in_field: stopped,
         blocked_by_solids,
@@ -97,7 +123,8 @@ mod tests {
         let half = 1 << 31;
         let mut words = vec![0, 1, half, 2, half, 0, 0, 0, 7, 8];
         words.extend([1, 0, 2, 0, 3, 0, 4, 0, 0, 1, 5, 0]);
-        let (tally, steps) = add_to_films(layout, &words, &films);
+        add_to_films(layout, &words, &films);
+        let (tally, steps) = outcomes(&words);
         assert_eq!(films[0].to_pixels(1.0), [[1.0], [2.5]]);
         assert_eq!(films[1].to_pixels(1.0), [[0.5], [0.0]]);
         assert_eq!(films[0].counts(), Some(vec![7, 8]));

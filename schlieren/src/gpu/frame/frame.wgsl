@@ -55,7 +55,8 @@ struct Frame {
     source_axis: vec2f,
     // Seed of the dots of a background.
     dots_seed: u32,
-    unused: u32,
+    // One over the photons that the undisturbed beam leaves in a pixel.
+    per_photon: f32,
     // Numbers of the technique.
     technique: array<vec4f, 4>,
 }

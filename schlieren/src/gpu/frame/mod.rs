@@ -15,6 +15,7 @@
 //! | technique.rs, technique/*.wgsl | its energy, by technique and cut-off |
 //! | photons.wgsl, corners.wgsl, triangles.wgsl | entry points |
 //! | film.rs, film.wgsl | the sums |
+//! | filter*.wgsl | brightness and its filter, unless more than the picture is wanted |
 //! | submissions.rs | buffers and kernels on a device, and the parts of a frame |
 //! | shader.rs | the shaders, assembled from what a scene needs |
 
@@ -29,7 +30,7 @@ use super::paths::DeviceState;
 use super::{GpuError, GpuPaths};
 use crate::film::photons::Exposure;
 use crate::film::{Film, Framing, Tally};
-use film::{FilmLayout, add_to_films};
+use film::{FilmLayout, add_to_films, outcomes, picture};
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 use submissions::FrameOnDevice;
@@ -58,6 +59,8 @@ struct Job<'a> {
     layout: FilmLayout,
     technique: &'a TechniqueShader<'a>,
     light: Light,
+    /// Weights of a filter by distance, if the picture is made on the device.
+    filter: Option<&'a [f64]>,
     cancel: &'a AtomicBool,
     /// Receives the number of photons or corners of each submission.
     progress: &'a (dyn Fn(u64) + Sync),
@@ -89,35 +92,69 @@ impl GpuPaths<'_> {
         cancel: &AtomicBool,
         progress: &(dyn Fn(u64) + Sync),
     ) -> Result<Tally, NotExposed> {
-        self.expose(exposure, films, Light::Photons { passes }, cancel, progress)
+        let layout = FilmLayout::of(films);
+        let light = Light::Photons { passes };
+        let framing = *films[0].framing();
+        let (words, tally) =
+            self.expose(exposure, framing, layout, light, None, cancel, progress)?;
+        add_to_films(layout, &words, films);
+        Ok(tally)
     }
 
-    /// As [`crate::film::beams::expose_beams`], on the device.
+    /// A picture by photons, filtered with weights by distance along rows and columns: brightness
+    /// of each pixel.
     ///
     /// # Errors
-    /// If it was cancelled, or the device cannot expose this film.
-    pub(crate) fn expose_beams<const C: usize>(
+    /// If it was cancelled, or the device cannot make this picture.
+    pub(crate) fn photograph_photons<const C: usize>(
         &self,
         exposure: &Exposure<'_>,
-        film: &Film<C>,
+        framing: Framing,
+        passes: Range<u32>,
+        filter: &[f64],
+        cancel: &AtomicBool,
+        progress: &(dyn Fn(u64) + Sync),
+    ) -> Result<(Vec<[f32; C]>, Tally), NotExposed> {
+        let light = Light::Photons { passes };
+        let layout = FilmLayout::of_picture::<C>(&framing);
+        let filter = Some(filter);
+        let (words, tally) =
+            self.expose(exposure, framing, layout, light, filter, cancel, progress)?;
+        Ok((picture(&words), tally))
+    }
+
+    /// A picture by beams ([`crate::film::beams::expose_beams`]): brightness of each pixel.
+    ///
+    /// # Errors
+    /// If it was cancelled, or the device cannot make this picture.
+    pub(crate) fn photograph_beams<const C: usize>(
+        &self,
+        exposure: &Exposure<'_>,
+        framing: Framing,
         per_side: u32,
         cancel: &AtomicBool,
         progress: &(dyn Fn(u64) + Sync),
-    ) -> Result<Tally, NotExposed> {
-        let film = std::slice::from_ref(film);
-        self.expose(exposure, film, Light::Beams { per_side }, cancel, progress)
+    ) -> Result<(Vec<[f32; C]>, Tally), NotExposed> {
+        let light = Light::Beams { per_side };
+        let layout = FilmLayout::of_picture::<C>(&framing);
+        let filter = Some(&[1.0][..]);
+        let (words, tally) =
+            self.expose(exposure, framing, layout, light, filter, cancel, progress)?;
+        Ok((picture(&words), tally))
     }
 
-    fn expose<const C: usize>(
+    #[allow(clippy::too_many_arguments, reason = "the parts of a job, which it puts together")]
+    fn expose(
         &self,
         exposure: &Exposure<'_>,
-        films: &[Film<C>],
+        framing: Framing,
+        layout: FilmLayout,
         light: Light,
+        filter: Option<&[f64]>,
         cancel: &AtomicBool,
         progress: &(dyn Fn(u64) + Sync),
-    ) -> Result<Tally, NotExposed> {
+    ) -> Result<(Vec<u32>, Tally), NotExposed> {
         let refused = NotExposed::Refused;
-        let framing = *films[0].framing();
         let margin = f64::from(exposure.margin_px);
         let reach_m = [[0.0, 0.0], [1.0, 1.0]]
             .map(|[x, y]: [f64; 2]| {
@@ -128,8 +165,8 @@ impl GpuPaths<'_> {
             .into_iter()
             .fold(0.0, f64::max);
         let technique = TechniqueShader::new(exposure.technique, reach_m).map_err(refused)?;
-        let layout = FilmLayout::of(films);
-        let job = Job { exposure, framing, layout, technique: &technique, light, cancel, progress };
+        let technique = &technique;
+        let job = Job { exposure, framing, layout, technique, light, filter, cancel, progress };
         let [width, height] = job.area();
         let per_side = match job.light {
             Light::Photons { .. } => 1,
@@ -166,7 +203,7 @@ impl GpuPaths<'_> {
             match self.run(&on_device, &job) {
                 Ok(None) => return Err(NotExposed::Cancelled),
                 Ok(Some(words)) => {
-                    let (mut tally, steps) = add_to_films(layout, &words, films);
+                    let (mut tally, steps) = outcomes(&words);
                     tally.sent = match &job.light {
                         Light::Photons { passes } => width * height * passes.len() as u64,
                         Light::Beams { per_side } => {
@@ -177,7 +214,7 @@ impl GpuPaths<'_> {
                     if failed {
                         self.cpu_fallback_paths.add_repeated(tally.sent);
                     }
-                    return Ok(tally);
+                    return Ok((words, tally));
                 }
                 Err(failure) => {
                     failed = true;

@@ -11,9 +11,9 @@ use glam::DVec3;
 #[repr(C)]
 pub(super) struct FrameParams {
     centre: [f32; 3],
-    width: u32,
+    pub(super) width: u32,
     centre_low: [f32; 3],
-    height: u32,
+    pub(super) height: u32,
     right_steps: [f32; 3],
     margin: u32,
     right_steps_low: [f32; 3],
@@ -46,7 +46,7 @@ pub(super) struct FrameParams {
     source_half_m: [f32; 2],
     source_axis: [f32; 2],
     pub(super) dots_seed: u32,
-    unused: u32,
+    pub(super) per_photon: f32,
     pub(super) technique: [[f32; 4]; 4],
 }
 

@@ -74,6 +74,18 @@ impl FrameShader<'_> {
         self.light() + &channels + include_str!("frame.wgsl") + include_str!("corners.wgsl")
     }
 
+    /// Filters the film along rows, or what comes of it along columns. The entry point is
+    /// `filter_noise`.
+    pub(super) fn filter(&self, rows: bool) -> String {
+        let constants = format!("const CHANNELS = {}u;\nconst ROWS = {rows};\n", self.channels);
+        let of_pass = if rows {
+            include_str!("filter_rows.wgsl")
+        } else {
+            include_str!("filter_columns.wgsl")
+        };
+        constants + include_str!("frame.wgsl") + of_pass + include_str!("filter.wgsl")
+    }
+
     /// Distributes the energy of cells. The entry point is `distribute_cells`.
     pub(super) fn triangles(&self) -> String {
         self.film() + include_str!("triangles.wgsl")
@@ -158,7 +170,12 @@ mod tests {
                     sampling: Sampling::ALL[(k & 1) as usize],
                     source: (k & 4 != 0 || technique.needs_source_points()).then_some(source),
                 };
-                for wgsl in [shader.photons(), shader.corners(), shader.triangles()] {
+                for wgsl in [
+                    shader.photons(),
+                    shader.corners(),
+                    shader.triangles(),
+                    shader.filter(k & 1 == 0),
+                ] {
                     let module = parsed(&wgsl);
                     let mut v = Validator::new(ValidationFlags::all(), Capabilities::empty());
                     if let Err(e) = v.validate(&module) {
@@ -174,6 +191,6 @@ mod tests {
                 }
             }
         }
-        assert_eq!(checked, (1 + 4 * 10 + 2) * 8 * 3);
+        assert_eq!(checked, (1 + 4 * 10 + 2) * 8 * 4);
     }
 }

@@ -26,6 +26,9 @@ const IN_FLIGHT: usize = 2;
 /// Largest number of work groups along an axis.
 const MOST_GROUPS: usize = 65_535;
 
+/// A kernel with what is bound to it.
+type BoundKernel = (wgpu::ComputePipeline, [wgpu::BindGroup; 2]);
+
 /// A frame's buffers and kernels on a device.
 pub(super) struct FrameOnDevice<'a> {
     gpu: Arc<Gpu>,
@@ -36,7 +39,9 @@ pub(super) struct FrameOnDevice<'a> {
     /// Bits of the rays of a submission that bodies stop.
     bodies: Option<wgpu::Buffer>,
     /// Kernels with what is bound to them, in the order in which they run.
-    kernels: Vec<(wgpu::ComputePipeline, [wgpu::BindGroup; 2])>,
+    kernels: Vec<BoundKernel>,
+    /// Kernels that make the picture of the film, and the picture.
+    picture: Option<(Vec<BoundKernel>, wgpu::Buffer)>,
     in_flight: VecDeque<(wgpu::SubmissionIndex, u64)>,
     progress: &'a (dyn Fn(u64) + Sync),
 }
@@ -138,9 +143,48 @@ impl<'a> FrameOnDevice<'a> {
                 kernels.push((pipeline, groups));
             }
         }
+        let picture = match job.filter {
+            None => None,
+            Some(weights) => {
+                params.per_photon = match &job.light {
+                    Light::Photons { passes } => 1.0 / passes.len() as f32,
+                    Light::Beams { .. } => 1.0,
+                };
+                let weights: Vec<f32> = weights.iter().map(|w| *w as f32).collect();
+                let bytes = layout.picture_bytes() as usize;
+                let [rows, pixels, of_weights] = gpu.checked(|| {
+                    let of_weights = gpu.buffer(size_of_val(&weights[..]), storage | to_device);
+                    gpu.queue.write_buffer(&of_weights, 0, bytemuck::cast_slice(&weights));
+                    let pixels = gpu.buffer(bytes, storage | BufferUsages::COPY_SRC);
+                    [gpu.buffer(bytes, storage), pixels, of_weights]
+                })?;
+                paths.work.add_to_device(of_weights.size());
+                let bind = |of_rows: bool| {
+                    let pipeline = gpu.pipeline(shader.filter(of_rows), "filter_noise")?;
+                    let (from, to) =
+                        if of_rows { ((1, &film), (2, &rows)) } else { ((2, &rows), (5, &pixels)) };
+                    let own = [(0, &frame), from, to, (6, &of_weights)]
+                        .map(|(i, b)| (i, b.as_entire_binding()));
+                    let groups = gpu.bind(&pipeline, [&[], &own])?;
+                    Ok::<_, GpuError>((pipeline, groups))
+                };
+                Some((vec![bind(true)?, bind(false)?], pixels))
+            }
+        };
         let (layout, progress) = (*layout, job.progress);
         let in_flight = VecDeque::new();
-        Ok(FrameOnDevice { gpu, params, layout, frame, film, bodies, kernels, in_flight, progress })
+        Ok(FrameOnDevice {
+            gpu,
+            params,
+            layout,
+            frame,
+            film,
+            bodies,
+            kernels,
+            picture,
+            in_flight,
+            progress,
+        })
     }
 
     /// Returns false when it was cancelled.
@@ -242,15 +286,7 @@ impl<'a> FrameOnDevice<'a> {
         gpu.queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&self.params));
         paths.work.add_to_device(self.frame.size());
         let mut commands = gpu.device.create_command_encoder(&Default::default());
-        {
-            let mut pass = commands.begin_compute_pass(&Default::default());
-            for ((pipeline, bound), [x, y]) in self.kernels.iter().zip(groups) {
-                pass.set_pipeline(pipeline);
-                pass.set_bind_group(0, &bound[0], &[]);
-                pass.set_bind_group(1, &bound[1], &[]);
-                pass.dispatch_workgroups(*x, *y, 1);
-            }
-        }
+        run(&mut commands, &self.kernels, groups);
         let index = gpu.queue.submit([commands.finish()]);
         paths.work.add_submission(groups.len() as u64);
         self.in_flight.push_back((index, rays));
@@ -274,12 +310,23 @@ impl<'a> FrameOnDevice<'a> {
 
     /// Waits for the film and reads its words.
     pub(super) fn read(mut self, paths: &GpuPaths<'_>) -> Result<Vec<u32>, GpuError> {
-        let bytes = self.film.size();
+        let [first_outcome, outcomes] = self.layout.outcome_bytes();
+        let before =
+            if self.picture.is_some() { self.layout.picture_bytes() } else { first_outcome };
+        let bytes = before + outcomes;
         let gpu = Arc::clone(&self.gpu);
         let usage = BufferUsages::MAP_READ | BufferUsages::COPY_DST;
         let readback = gpu.checked(|| gpu.buffer(bytes as usize, usage))?;
         let mut commands = gpu.device.create_command_encoder(&Default::default());
-        commands.copy_buffer_to_buffer(&self.film, 0, &readback, 0, bytes);
+        let mut from = &self.film;
+        if let Some((kernels, picture)) = &self.picture {
+            let groups = [self.params.width.div_ceil(TILE as u32), self.params.height];
+            run(&mut commands, kernels, &[groups; 2]);
+            paths.work.add_submission(2);
+            from = picture;
+        }
+        commands.copy_buffer_to_buffer(from, 0, &readback, 0, before);
+        commands.copy_buffer_to_buffer(&self.film, first_outcome, &readback, before, outcomes);
         gpu.queue.submit([commands.finish()]);
         while !self.in_flight.is_empty() {
             self.wait_for_first()?;
@@ -287,6 +334,17 @@ impl<'a> FrameOnDevice<'a> {
         let words = gpu.read(&readback)?;
         paths.work.add_from_device(bytes);
         Ok(words)
+    }
+}
+
+/// Records kernels with these numbers of work groups.
+fn run(commands: &mut wgpu::CommandEncoder, kernels: &[BoundKernel], groups: &[[u32; 2]]) {
+    let mut pass = commands.begin_compute_pass(&Default::default());
+    for ((pipeline, bound), [x, y]) in kernels.iter().zip(groups) {
+        pass.set_pipeline(pipeline);
+        pass.set_bind_group(0, &bound[0], &[]);
+        pass.set_bind_group(1, &bound[1], &[]);
+        pass.dispatch_workgroups(*x, *y, 1);
     }
 }
 
