@@ -86,6 +86,8 @@ const RtvMaps* rtvMapsOf(const RtvSurface& s, vtkProperty* property, RtvMaps& ma
 uint32_t rtvTextureBits(vtkTexture* texture);
 // A volume.
 const char* rtvAddVolume(RtvBridge* bridge, vtkVolume* volume, vtkRenderer* renderer, const std::string& name);
+// Tells the choice between rays and OpenGL of a volume.
+void rtvChooseVolume(RtvBridge* bridge, vtkVolume* volume, vtkRenderer* renderer, const RtvView& view);
 // Copies of the sources of a glyph mapper.
 const char* rtvAddGlyphs(RtvBridge* bridge, vtkActor* actor, vtkGlyph3DMapper* mapper, vtkDataObject* data,
   const RtvProperty& property, const std::string& name);

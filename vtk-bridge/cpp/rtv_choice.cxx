@@ -1,9 +1,10 @@
 // What the choice between rays and OpenGL is made from.
-#include "rtv_shim.h"
+#include "rtv_arrays.h"
 
 #include <cmath>
 #include <string>
 #include <vtkActor.h>
+#include <vtkActor2D.h>
 #include <vtkCellArray.h>
 #include <vtkDataSet.h>
 #include <vtkGlyph3DMapper.h>
@@ -48,6 +49,18 @@ uint64_t TrianglesOf(vtkMapper* mapper)
   // Of a block of n cells, about 6 n^(2/3) faces are outside.
   return vtkDataSet::SafeDownCast(data) ? static_cast<uint64_t>(12 * std::pow(cells, 2.0 / 3.0)) : cells;
 }
+
+// Whether an actor shows polygons and nothing else.
+bool IsSurface(vtkActor* actor)
+{
+  vtkMapper* mapper = actor->GetMapper();
+  if (TrianglesOf(mapper) == 0 || actor->GetProperty()->GetRepresentation() != VTK_SURFACE)
+  {
+    return false;
+  }
+  auto data = vtkPolyData::SafeDownCast(mapper->GetInputDataObject(0, 0));
+  return !data || (data->GetNumberOfVerts() == 0 && data->GetNumberOfLines() == 0);
+}
 }
 
 bool RtvChoice::OpenGLDraws(RtvBridge* bridge, vtkRenderer* renderer, vtkProp** props, int count)
@@ -58,6 +71,7 @@ bool RtvChoice::OpenGLDraws(RtvBridge* bridge, vtkRenderer* renderer, vtkProp** 
   facts.pixels = static_cast<uint64_t>(width) * height;
   facts.props = static_cast<uint32_t>(count);
   facts.shadows = renderer->GetUseShadows() ? 1 : 0;
+  facts.interactive = renderer->GetRenderWindow()->GetDesiredUpdateRate() > 1.0 ? 1 : 0;
   uint32_t answer = rtvApi->choose(bridge, &facts);
   if (answer == RTV_CHOICE_ASK_AGAIN)
   {
@@ -80,10 +94,16 @@ bool RtvChoice::OpenGLDraws(RtvBridge* bridge, vtkRenderer* renderer, vtkProp** 
         facts.triangles += TrianglesOf(actor->GetMapper());
         facts.translucent += actor->HasTranslucentPolygonalGeometry() ? 1 : 0;
         facts.edges += actor->GetProperty()->GetEdgeVisibility() ? 1 : 0;
+        facts.others += IsSurface(actor) ? 0 : 1;
       }
-      else if (vtkVolume::SafeDownCast(props[i]))
+      else if (auto volume = vtkVolume::SafeDownCast(props[i]))
       {
         facts.volumes += 1;
+        rtvChooseVolume(bridge, volume, renderer, rtvView(renderer, width, height));
+      }
+      else if (!vtkActor2D::SafeDownCast(props[i]))
+      {
+        facts.others += 1;
       }
     }
     answer = rtvApi->choose(bridge, &facts);

@@ -33,6 +33,10 @@ namespace
 // The number of entries of OpenGL's tables.
 const int Entries = 1024;
 
+// What the choice between rays and OpenGL looks at: points per axis, and entries of the table.
+const uint32_t FewPoints = 32;
+const int FewEntries = 256;
+
 // What OpenGL's table of opacities by gradient reaches to: a quarter of the range of the scalars.
 const double GradientRange = 0.25;
 
@@ -183,19 +187,14 @@ void ReadProperty(vtkVolumeProperty* property, RtvVolumeFacts& facts)
   facts.specular = property->GetSpecular(0);
 }
 
-const char* AddGrid(RtvBridge* bridge, vtkVolumeMapper* mapper, vtkVolume* volume, vtkImageData* image, vtkCamera* camera,
-  const Lights& lights, const std::string& name, RtvVolumeFacts& facts)
+// The scalars of an image, which may be null, and facts about both.
+vtkDataArray* ReadImage(vtkVolumeMapper* mapper, vtkImageData* image, RtvVolumeFacts& facts)
 {
-  vtkVolumeProperty* property = volume->GetProperty();
-  RtvVolume v = {};
-  v.name = name.c_str();
   int extent[6], cellFlag = 0;
   image->GetExtent(extent);
   for (int axis = 0; axis < 3; ++axis)
   {
-    v.dims[axis] = static_cast<uint32_t>(std::max(0, extent[2 * axis + 1] - extent[2 * axis] + 1));
-    v.spacing[axis] = image->GetSpacing()[axis];
-    facts.dims[axis] = v.dims[axis];
+    facts.dims[axis] = static_cast<uint32_t>(std::max(0, extent[2 * axis + 1] - extent[2 * axis] + 1));
   }
   facts.image = 1;
   facts.blanked = image->HasAnyBlankPoints() || image->HasAnyBlankCells() ? 1 : 0;
@@ -206,14 +205,64 @@ const char* AddGrid(RtvBridge* bridge, vtkVolumeMapper* mapper, vtkVolume* volum
   facts.num_components = scalars ? static_cast<uint32_t>(scalars->GetNumberOfComponents()) : 0;
   if (scalars)
   {
-    scalars->GetFiniteRange(v.range, 0);
-    if (!(v.range[1] > v.range[0]))
+    scalars->GetFiniteRange(facts.range, 0);
+    if (!(facts.range[1] > facts.range[0]))
     {
-      v.range[1] = v.range[0] + std::max(1e-6 * std::abs(v.range[0]), 1e-30);
+      facts.range[1] = facts.range[0] + std::max(1e-6 * std::abs(facts.range[0]), 1e-30);
     }
-    std::copy(v.range, v.range + 2, facts.range);
   }
   std::copy(mapper->GetAverageIPScalarRange(), mapper->GetAverageIPScalarRange() + 2, facts.average_range);
+  return scalars;
+}
+
+// The one image of a mapper, or null.
+vtkImageData* ImageOf(vtkVolumeMapper* mapper, RtvVolumeFacts& facts)
+{
+  vtkDataObject* data = mapper->GetNumberOfInputConnections(0) > 0 ? mapper->GetInputDataObject(0, 0) : nullptr;
+  vtkImageData* image = vtkImageData::SafeDownCast(data);
+  if (auto composite = vtkCompositeDataSet::SafeDownCast(data))
+  {
+    auto it = vtkSmartPointer<vtkCompositeDataIterator>::Take(composite->NewIterator());
+    for (it->InitTraversal(); !it->IsDoneWithTraversal(); it->GoToNextItem())
+    {
+      // One block is as good as the image alone.
+      image = facts.num_blocks == 0 ? vtkImageData::SafeDownCast(it->GetCurrentDataObject()) : nullptr;
+      ++facts.num_blocks;
+    }
+  }
+  facts.has_data = 1;
+  return image;
+}
+
+// Index times spacing, rotated by the image's directions, moved to its first point, then the prop's
+// matrix.
+void ReadMatrix(vtkVolume* volume, vtkImageData* image, vtkMatrix4x4* world)
+{
+  const int* extent = image->GetExtent();
+  double first[3];
+  image->TransformIndexToPhysicalPoint(extent[0], extent[2], extent[4], first);
+  vtkNew<vtkMatrix4x4> local;
+  for (int row = 0; row < 3; ++row)
+  {
+    for (int column = 0; column < 3; ++column)
+    {
+      local->SetElement(row, column, image->GetDirectionMatrix()->GetElement(row, column));
+    }
+    local->SetElement(row, 3, first[row]);
+  }
+  vtkMatrix4x4::Multiply4x4(volume->GetMatrix(), local, world);
+}
+
+const char* AddGrid(RtvBridge* bridge, vtkVolumeMapper* mapper, vtkVolume* volume, vtkImageData* image, vtkCamera* camera,
+  const Lights& lights, const std::string& name, RtvVolumeFacts& facts)
+{
+  vtkVolumeProperty* property = volume->GetProperty();
+  RtvVolume v = {};
+  v.name = name.c_str();
+  vtkDataArray* scalars = ReadImage(mapper, image, facts);
+  std::copy(facts.dims, facts.dims + 3, v.dims);
+  std::copy(image->GetSpacing(), image->GetSpacing() + 3, v.spacing);
+  std::copy(facts.range, facts.range + 2, v.range);
   if (const char* reason = rtvApi->check_volume(bridge, &facts))
   {
     return reason;
@@ -253,21 +302,9 @@ const char* AddGrid(RtvBridge* bridge, vtkVolumeMapper* mapper, vtkVolume* volum
     }
   }
 
-  // ---- Transform: index times spacing, rotated by the image's directions, moved to its first
-  // point, then the prop's matrix.
-  double first[3];
-  image->TransformIndexToPhysicalPoint(extent[0], extent[2], extent[4], first);
-  vtkNew<vtkMatrix4x4> local;
-  for (int row = 0; row < 3; ++row)
-  {
-    for (int column = 0; column < 3; ++column)
-    {
-      local->SetElement(row, column, image->GetDirectionMatrix()->GetElement(row, column));
-    }
-    local->SetElement(row, 3, first[row]);
-  }
+  // ---- Transform.
   vtkNew<vtkMatrix4x4> world;
-  vtkMatrix4x4::Multiply4x4(volume->GetMatrix(), local, world);
+  ReadMatrix(volume, image, world);
   std::copy(&world->Element[0][0], &world->Element[0][0] + 16, v.world_from_data);
 
   // ---- Tables over the range of the scalars, as OpenGL's are.
@@ -367,23 +404,88 @@ const char* rtvAddVolume(RtvBridge* bridge, vtkVolume* volume, vtkRenderer* rend
   {
     mapper->GetInputAlgorithm(0, 0)->Update();
   }
-  vtkDataObject* data = mapper->GetNumberOfInputConnections(0) > 0 ? mapper->GetInputDataObject(0, 0) : nullptr;
-  vtkImageData* image = vtkImageData::SafeDownCast(data);
-  if (auto composite = vtkCompositeDataSet::SafeDownCast(data))
-  {
-    auto it = vtkSmartPointer<vtkCompositeDataIterator>::Take(composite->NewIterator());
-    for (it->InitTraversal(); !it->IsDoneWithTraversal(); it->GoToNextItem())
-    {
-      // One block is as good as the image alone.
-      image = facts.num_blocks == 0 ? vtkImageData::SafeDownCast(it->GetCurrentDataObject()) : nullptr;
-      ++facts.num_blocks;
-    }
-  }
-  facts.has_data = 1;
+  vtkImageData* image = ImageOf(mapper, facts);
   if (!image)
   {
     return rtvApi->check_volume(bridge, &facts);
   }
   vtkCamera* camera = renderer->GetActiveCamera();
   return AddGrid(bridge, mapper, volume, image, camera, lights, name, facts);
+}
+
+void rtvChooseVolume(RtvBridge* bridge, vtkVolume* volume, vtkRenderer* renderer, const RtvView& view)
+{
+  auto mapper = vtkVolumeMapper::SafeDownCast(volume->GetMapper());
+  vtkVolumeProperty* property = volume->GetProperty();
+  RtvVolumeFacts facts = {};
+  vtkImageData* image = mapper && property ? ImageOf(mapper, facts) : nullptr;
+  vtkDataArray* scalars = image ? ReadImage(mapper, image, facts) : nullptr;
+  if (!scalars)
+  {
+    return;
+  }
+  facts.volume_class = volume->GetClassName();
+  facts.mapper_class = mapper->GetClassName();
+  ReadMapper(mapper, facts);
+  ReadProperty(property, facts);
+  Lights lights;
+  if (facts.shade)
+  {
+    ReadLights(renderer, lights, facts);
+  }
+  RtvSceneVolume v = {};
+  v.facts = &facts;
+  v.view = &view;
+
+  // ---- A few scalars.
+  uint64_t count = 1;
+  for (int axis = 0; axis < 3; ++axis)
+  {
+    v.dims[axis] = std::min(facts.dims[axis], FewPoints);
+    count *= v.dims[axis];
+  }
+  if (count == 0 || scalars->GetNumberOfTuples() != image->GetNumberOfPoints())
+  {
+    return;
+  }
+  const auto at = [&](int axis, uint64_t i) {
+    const uint64_t last = std::max(v.dims[axis], 2u) - 1;
+    return (i * (facts.dims[axis] - 1) + last / 2) / last;
+  };
+  std::vector<float> few;
+  few.reserve(count);
+  for (uint64_t k = 0; k < v.dims[2]; ++k)
+  {
+    for (uint64_t j = 0; j < v.dims[1]; ++j)
+    {
+      const uint64_t row = (at(2, k) * facts.dims[1] + at(1, j)) * facts.dims[0];
+      for (uint64_t i = 0; i < v.dims[0]; ++i)
+      {
+        few.push_back(static_cast<float>(scalars->GetComponent(static_cast<vtkIdType>(row + at(0, i)), 0)));
+      }
+    }
+  }
+  v.scalars = RtvArray{ few.data(), count, 1, RTV_F32 };
+
+  // ---- Opacities, samples and place.
+  std::vector<float> opacities(FewEntries);
+  property->GetScalarOpacity(0)->GetTable(facts.range[0], facts.range[1], FewEntries, opacities.data());
+  v.opacities = RtvArray{ opacities.data(), opacities.size(), 1, RTV_F32 };
+  v.unit_distance = property->GetScalarOpacityUnitDistance(0);
+  v.sample_distance = SampleDistance(mapper, image, facts.dims, volume->GetMatrix());
+  auto gpu = vtkGPUVolumeRayCastMapper::SafeDownCast(mapper);
+  auto smart = vtkSmartVolumeMapper::SafeDownCast(mapper);
+  v.adjusts = (gpu && gpu->GetAutoAdjustSampleDistances()) ||
+      (smart && (smart->GetAutoAdjustSampleDistances() || smart->GetInteractiveAdjustSampleDistances()))
+    ? 1
+    : 0;
+  vtkNew<vtkMatrix4x4> world;
+  ReadMatrix(volume, image, world);
+  for (int i = 0; i < 16; ++i)
+  {
+    const int axis = i % 4;
+    const double size = axis < 3 ? image->GetSpacing()[axis] * (facts.dims[axis] - 1.0) : 1.0;
+    v.world_from_unit[i] = world->Element[i / 4][axis] * size;
+  }
+  rtvApi->choose_volume(bridge, &v);
 }

@@ -515,7 +515,7 @@ typedef struct RtvVolumeFacts {
 #define RTV_CHOICE_OPENGL 1u
 /* The caller has to collect the scene's facts and ask again. */
 #define RTV_CHOICE_ASK_AGAIN 2u
-/* A renderer's scene, for the choice between rays and OpenGL. The first three fields are always set, the others only when rtv_choose asks for them. */
+/* A renderer's scene, for the choice between rays and OpenGL. The first four fields are always set, the others only when rtv_choose asks for them. */
 typedef struct RtvSceneFacts {
   /* Pixels of the viewport. */
   uint64_t pixels;
@@ -523,14 +523,18 @@ typedef struct RtvSceneFacts {
   uint32_t props;
   /* 1 when the program itself asks for shadows. */
   uint32_t shadows;
+  /* As in RtvView. */
+  uint32_t interactive;
   /* 1 when the fields below are set. */
   uint32_t known;
   /* 1 if OpenGL's driver works on the processor. */
   uint32_t software;
   /* 1 for the Python package. */
   uint32_t python;
-  /* Visible volumes. */
+  /* Visible volumes; those that rtv_choose_volume was told of and others. */
   uint32_t volumes;
+  /* Visible props in space, other than volumes, that have no polygons or more than polygons. */
+  uint32_t others;
   /* Visible props with translucent surfaces. */
   uint32_t translucent;
   /* Visible props with edges. */
@@ -538,8 +542,29 @@ typedef struct RtvSceneFacts {
   /* Triangles of the visible props, in all copies. */
   uint64_t triangles;
 } RtvSceneFacts;
+/* A visible volume of a scene, for the choice: what it is to draw. Its pipeline need not be up to date. */
+typedef struct RtvSceneVolume {
+  /* What rtv_check_volume would be asked with, but for range, which is that of the opacities. */
+  RtvVolumeFacts const* facts;
+  /* The view of the frame. */
+  RtvView const* view;
+  /* Scalars at a few points per axis, evenly spread from the first to the last: one RTV_F32 each, x fastest. */
+  RtvArray scalars;
+  /* How many per axis. */
+  uint32_t dims[3];
+  /* 1 if OpenGL takes fewer samples while the user turns the scene. */
+  uint32_t adjusts;
+  /* As in RtvVolume. */
+  RtvArray opacities;
+  /* As in RtvVolume. */
+  double unit_distance;
+  /* As in RtvVolume. */
+  double sample_distance;
+  /* World position of a point of the unit cube, which the image fills; row by row. */
+  double world_from_unit[16];
+} RtvSceneVolume;
 /* Version of this interface, computed from its structures and calls (a test gives the value). A shim built for another version must not continue. */
-#define RTV_ABI 2667571646u
+#define RTV_ABI 3248043196u
 /* All calls in one table, so that a shim needs only one symbol. */
 typedef struct RtvApi {
   /* rtv_abi. */
@@ -590,6 +615,8 @@ typedef struct RtvApi {
   char const* (*check_volume)(RtvBridge*, RtvVolumeFacts const*);
   /* rtv_choose. */
   uint32_t (*choose)(RtvBridge*, RtvSceneFacts const*);
+  /* rtv_choose_volume. */
+  void (*choose_volume)(RtvBridge*, RtvSceneVolume const*);
 } RtvApi;
 
 /* RTV_ABI of the library. */
@@ -612,6 +639,8 @@ void rtv_host(uint32_t vtk_major, uint32_t vtk_minor, uint32_t vtk_build);
 int32_t rtv_begin(RtvBridge* bridge);
 /* Says who draws this frame: one of RTV_CHOICE_*. Where the picture is the same either way and a model says that OpenGL is cheaper, it is OpenGL. Call it after rtv_begin, before anything is added; a caller that does not ask traces. */
 uint32_t rtv_choose(RtvBridge* bridge, RtvSceneFacts const* facts);
+/* Tells the choice of a visible volume: after rtv_choose has asked for facts, and before it is called with them. */
+void rtv_choose_volume(RtvBridge* bridge, RtvSceneVolume const* volume);
 /* Adds a surface: 1 if it will be traced, 0 if it has nothing to trace, -1 if its arrays are invalid. */
 int32_t rtv_surface(RtvBridge* bridge, RtvSurface const* surface);
 /* Adds all surfaces of one prop, or none of them, so that nothing is drawn twice. Returns how many will be traced, or -1 if the arrays of one are invalid (a warning names it). */

@@ -286,6 +286,11 @@ impl Bridge {
         self.report.passed.push(UntracedItem { name: name.to_owned(), reason: reason.to_owned() });
     }
 
+    /// Records for the report who draws this frame, and why.
+    pub fn report_choice(&mut self, why: &str) {
+        self.report.choice = why.to_owned();
+    }
+
     /// The number of surfaces added this frame.
     pub fn num_surfaces(&self) -> usize {
         self.surfaces.len()

@@ -48,6 +48,8 @@ pub struct Milliseconds {
 pub struct FrameReport {
     /// Number of frames so far.
     pub frame: u64,
+    /// Who draws where the picture is the same either way, and why; empty if nobody asked.
+    pub choice: String,
     /// What was ray traced.
     pub traced: Vec<TracedItem>,
     /// What OpenGL draws, and why.

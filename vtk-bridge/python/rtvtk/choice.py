@@ -2,9 +2,11 @@
 import ctypes as C
 
 from vtkmodules.vtkCommonDataModel import vtkPolyData
-from vtkmodules.vtkRenderingCore import vtkActor, vtkGlyph3DMapper
+from vtkmodules.vtkRenderingCore import vtkActor, vtkActor2D, vtkGlyph3DMapper
 
 from . import library as rtv
+from . import volumes
+from .view import view_of
 
 _SOFTWARE = ("llvmpipe", "softpipe", "swrast", "SWR")
 
@@ -18,13 +20,14 @@ class Choice:
 
     def opengl_draws(self, renderer, size):
         facts = rtv.SceneFacts(pixels=size[0] * size[1], props=renderer.GetViewProps().GetNumberOfItems(), shadows=bool(renderer.GetUseShadows()))
+        facts.interactive = renderer.GetRenderWindow().GetDesiredUpdateRate() > 1.0
         answer = self._bridge.choose(C.byref(facts))
         if answer == rtv.CHOICE_ASK_AGAIN:
-            self._look(renderer, facts)
+            self._look(renderer, size, facts)
             answer = self._bridge.choose(C.byref(facts))
         return answer == rtv.CHOICE_OPENGL
 
-    def _look(self, renderer, facts):
+    def _look(self, renderer, size, facts):
         if self._software is None:
             capabilities = renderer.GetRenderWindow().ReportCapabilities()
             self._software = any(name in capabilities for name in _SOFTWARE)
@@ -38,8 +41,12 @@ class Choice:
                 facts.triangles += _triangles(prop.GetMapper())
                 facts.translucent += bool(prop.HasTranslucentPolygonalGeometry())
                 facts.edges += bool(prop.GetProperty().GetEdgeVisibility())
+                facts.others += not _is_surface(prop)
             elif prop.IsA("vtkVolume"):
                 facts.volumes += 1
+                volumes.choose(self._bridge, prop, renderer, view_of(renderer, *size))
+            elif not isinstance(prop, vtkActor2D):
+                facts.others += 1
 
 
 def _triangles(mapper):
@@ -60,3 +67,12 @@ def _triangles(mapper):
 
 def _of_polygons(data):
     return sum(max(0, cells.GetNumberOfConnectivityIds() - 2 * cells.GetNumberOfCells()) for cells in (data.GetPolys(), data.GetStrips()))
+
+
+def _is_surface(actor):
+    """Whether an actor shows polygons and nothing else."""
+    mapper = actor.GetMapper()
+    if _triangles(mapper) == 0 or actor.GetProperty().GetRepresentation() != rtv.SURFACE:
+        return False
+    data = mapper.GetInputDataObject(0, 0)
+    return not isinstance(data, vtkPolyData) or data.GetNumberOfVerts() == data.GetNumberOfLines() == 0

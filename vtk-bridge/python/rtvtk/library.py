@@ -4,7 +4,7 @@ import os
 
 import numpy as np
 
-ABI = 2667571646
+ABI = 3248043196
 #: The first VTK whose renderers Python can replace.
 OLDEST_VTK = (9, 4)
 NONE, U8, F32, F64, I32, I64 = range(6)
@@ -107,7 +107,8 @@ class ActorFacts(C.Structure):
 
 class SceneFacts(C.Structure):
     _fields_ = [("pixels", C.c_uint64)]
-    _fields_ += [(n, C.c_uint32) for n in ("props", "shadows", "known", "software", "python", "volumes", "translucent", "edges")]
+    _fields_ += [(n, C.c_uint32) for n in (
+        "props", "shadows", "interactive", "known", "software", "python", "volumes", "others", "translucent", "edges")]
     _fields_ += [("triangles", C.c_uint64)]
 
 
@@ -138,6 +139,13 @@ class VolumeFacts(C.Structure):
     _fields_ += [("dims", C.c_uint32 * 3)]
     _fields_ += [(n, C.c_uint32) for n in ("blanked", "scalars", "cell_scalars", "num_components")]
     _fields_ += [(n, C.c_double * 2) for n in ("range", "average_range")]
+
+
+class SceneVolume(C.Structure):
+    _fields_ = [
+        ("facts", C.POINTER(VolumeFacts)), ("view", C.POINTER(View)), ("scalars", Array), ("dims", C.c_uint32 * 3), ("adjusts", C.c_uint32),
+        ("opacities", Array), ("unit_distance", C.c_double), ("sample_distance", C.c_double), ("world_from_unit", C.c_double * 16),
+    ]
 
 
 def _places():
@@ -186,6 +194,7 @@ def _functions(library, path):
         has_colors=bind("rtv_has_colors", C.c_int32, p, C.c_uint64, C.c_uint64),
         volume=bind("rtv_volume", text, p, C.POINTER(Volume)), has_volume=bind("rtv_has_volume", C.c_int32, p, C.c_uint64),
         choose=bind("rtv_choose", C.c_uint32, p, C.POINTER(SceneFacts)),
+        choose_volume=bind("rtv_choose_volume", None, p, C.POINTER(SceneVolume)),
         check_actor=bind("rtv_check_actor", text, p, C.POINTER(ActorFacts)),
         check_surface=bind("rtv_check_surface", text, p, C.POINTER(SurfaceFacts)),
         check_glyphs=bind("rtv_check_glyphs", text, p, C.POINTER(GlyphFacts)),

@@ -1,7 +1,9 @@
 """Volumes on uniform grids. Which of them are traced decides the library from facts about them."""
+import ctypes as C
 import math
 
 import numpy as np
+from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonCore import reference
 from vtkmodules.vtkCommonDataModel import vtkCompositeDataSet, vtkImageData
 from vtkmodules.vtkRenderingCore import vtkAbstractMapper
@@ -12,9 +14,13 @@ from .eligibility import require
 
 # The number of entries of OpenGL's tables.
 _ENTRIES = 1024
+# What the choice between rays and OpenGL looks at: points per axis, and entries of the table.
+_FEW_POINTS, _FEW_ENTRIES = 32, 256
 _KINDS = [np.dtype(t) for t in (np.float32, np.float64, np.uint8, np.int32)]
 # VTK's blend modes; the library uses the same numbers.
 _AVERAGE, _ADDITIVE, _ISOSURFACES = 3, 4, 5
+# Mappers that take samples in OpenGL.
+_SAMPLING = ("vtkGPUVolumeRayCastMapper", "vtkSmartVolumeMapper")
 # The upper end of OpenGL's gradient-opacity table, as a fraction of the scalar range.
 _GRADIENT_RANGE = 0.25
 
@@ -58,10 +64,10 @@ class _Lights:
         f.num_listed_lights = len(self.rows)
 
 
-def _image_of(mapper, f):
+def _image_of(mapper, f, update=True):
     """The image data of a mapper, or `None`."""
     connected = mapper.GetNumberOfInputConnections(0) > 0
-    if connected and mapper.GetInputAlgorithm(0, 0):
+    if update and connected and mapper.GetInputAlgorithm(0, 0):
         mapper.GetInputAlgorithm(0, 0).Update()
     data = mapper.GetInputDataObject(0, 0) if connected else None
     if isinstance(data, vtkCompositeDataSet):
@@ -78,7 +84,11 @@ def _image_of(mapper, f):
 
 
 def _scalars_of(mapper, image, f):
-    """The scalars of an image, which may be `None`."""
+    """The scalars of an image, which may be `None`, and facts about both."""
+    extent = image.GetExtent()
+    f.dims[:] = [max(0, extent[2 * a + 1] - extent[2 * a] + 1) for a in range(3)]
+    f.average_range[:] = mapper.GetAverageIPScalarRange()
+    f.blanked = bool(image.HasAnyBlankPoints() or image.HasAnyBlankCells())
     flag = reference(0)
     scalars = vtkAbstractMapper.GetScalars(
         image, mapper.GetScalarMode(), mapper.GetArrayAccessMode(), mapper.GetArrayId(), mapper.GetArrayName(), flag)
@@ -93,8 +103,7 @@ def _scalars_of(mapper, image, f):
 def _sample_distance(mapper, image, dims, matrix):
     """The distance of the samples that OpenGL takes along a ray, in data units; 0 for mappers that
     take none in OpenGL, or that move them by noise, whose mean is the integral."""
-    kinds = ("vtkGPUVolumeRayCastMapper", "vtkSmartVolumeMapper")
-    if any(mapper.IsA(kind) for kind in kinds) and mapper.GetUseJittering():
+    if any(mapper.IsA(kind) for kind in _SAMPLING) and mapper.GetUseJittering():
         return 0
     spacing = image.GetSpacing()
     # Half of the mean spacing, and less in grids of fewer than a million cells.
@@ -115,6 +124,49 @@ def _sample_distance(mapper, image, dims, matrix):
     # The smallest spacing in the world. While the user turns the scene OpenGL may take longer steps.
     row = lambda i: math.hypot(*(matrix.GetElement(i, j) for j in range(3)))
     return min(s * row(i) for i, s in enumerate(spacing))
+
+
+def _world_from_image(volume, image):
+    """Index times spacing, rotated by the image's directions, moved to its first point, then the prop's matrix."""
+    first, local = [0.0] * 3, np.eye(4)
+    image.TransformIndexToPhysicalPoint(*image.GetExtent()[::2], first)
+    directions = image.GetDirectionMatrix()
+    local[:3, :3] = [[directions.GetElement(i, j) for j in range(3)] for i in range(3)]
+    local[:3, 3] = first
+    return np.array(volume.GetMatrix().GetData()).reshape(4, 4) @ local
+
+
+def _few_scalars(scalars, dims):
+    """Scalars at a few points per axis, evenly spread from the first to the last, indexed by z, y and x."""
+    few = [min(n, _FEW_POINTS) for n in dims]
+    at = [(np.arange(m) * (n - 1) + (m - 1) // 2) // max(m - 1, 1) for m, n in zip(few, dims)]
+    return np.ascontiguousarray(vtk_to_numpy(scalars).reshape(dims[::-1])[np.ix_(*at[::-1])], np.float32)
+
+
+def choose(bridge, volume, renderer, view):
+    """Tells the choice between rays and OpenGL of a volume. Updates nothing."""
+    mapper, p, f = volume.GetMapper(), volume.GetProperty(), rtv.VolumeFacts(volume_class=volume.GetClassName().encode())
+    # Others are not known to the library either.
+    if mapper is None or not any(mapper.IsA(kind) for kind in _SAMPLING):
+        return
+    image = _image_of(mapper, f, update=False)
+    scalars = None if image is None else _scalars_of(mapper, image, f)
+    if scalars is None or not scalars.HasStandardMemoryLayout() or scalars.GetNumberOfValues() != math.prod(f.dims):
+        return
+    f.mapper_class = mapper.GetClassName().encode()
+    _read_mapper(mapper, f)
+    _read_property(p, f)
+    if f.shade:
+        _Lights(renderer, f)
+    few, (low, high), opacity = _few_scalars(scalars, list(f.dims)), f.range, p.GetScalarOpacity(0)
+    opacities = np.array([opacity.GetValue(x) for x in np.linspace(low, high, _FEW_ENTRIES).tolist()], np.float32).reshape(-1, 1)
+    v = rtv.SceneVolume(facts=C.pointer(f), view=C.pointer(view), scalars=rtv.Array.of(few.reshape(-1, 1)), opacities=rtv.Array.of(opacities))
+    v.dims[:] = few.shape[::-1]
+    v.adjusts = any(hasattr(mapper, name) and getattr(mapper, name)() for name in ("GetAutoAdjustSampleDistances", "GetInteractiveAdjustSampleDistances"))
+    v.unit_distance, v.sample_distance = p.GetScalarOpacityUnitDistance(0), _sample_distance(mapper, image, list(f.dims), volume.GetMatrix())
+    size = np.append(np.array(image.GetSpacing()) * (np.array(f.dims) - 1.0), 1.0)
+    v.world_from_unit[:] = (_world_from_image(volume, image) * size).ravel().tolist()
+    bridge.choose_volume(C.byref(v))
 
 
 class Volumes:
@@ -143,24 +195,15 @@ class Volumes:
     def _add_grid(self, bridge, mapper, volume, image, camera, lights, name, f):
         p, v, keep = volume.GetProperty(), rtv.Volume(), []
         v.name = name.encode()
-        extent = image.GetExtent()
-        dims = [max(0, extent[2 * a + 1] - extent[2 * a] + 1) for a in range(3)]
-        f.dims[:], f.average_range[:] = dims, mapper.GetAverageIPScalarRange()
-        f.blanked = bool(image.HasAnyBlankPoints() or image.HasAnyBlankCells())
         scalars = _scalars_of(mapper, image, f)
+        dims = list(f.dims)
         require(bridge.check_volume, f)
         v.dims[:], v.spacing[:] = dims, image.GetSpacing()
         v.scalar_key = key_of(scalars, *dims, *image.GetSpacing())
         if not bridge.has_volume(v.scalar_key):
             v.scalars = rtv.Array.of(numbers(scalars, _KINDS, keep).reshape(-1, 1))
 
-        # ---- Transform: index times spacing, rotated by the image's directions, moved to its first point, then the prop's matrix.
-        first, local = [0.0] * 3, np.eye(4)
-        image.TransformIndexToPhysicalPoint(extent[0], extent[2], extent[4], first)
-        directions = image.GetDirectionMatrix()
-        local[:3, :3] = [[directions.GetElement(i, j) for j in range(3)] for i in range(3)]
-        local[:3, 3] = first
-        v.world_from_data[:] = (np.array(volume.GetMatrix().GetData()).reshape(4, 4) @ local).ravel().tolist()
+        v.world_from_data[:] = _world_from_image(volume, image).ravel().tolist()
 
         # ---- Tables over the range of the scalars, as OpenGL's are.
         low, high = v.range[:] = f.range[:]

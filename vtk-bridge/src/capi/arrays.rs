@@ -1,6 +1,8 @@
 //! Converts foreign arrays to slices after checking their kinds and lengths.
 
+use super::facts::{RtvSceneVolume, RtvVolumeFacts};
 use super::types::*;
+use crate::choice::volume_work::VolumeInView;
 use crate::input::{
     Cells, Color, Glyphs, Ids, Image, LightKind, Maps, PerItem, Points, Property, Scalars,
     SceneLight, Shading, Shape, Surface, Volume, VolumeBlend,
@@ -240,6 +242,34 @@ pub(super) unsafe fn volume<'a>(v: &RtvVolume, name: &'a str) -> Result<Volume<'
             },
         })
     }
+}
+
+/// Converts the volume, with its arrays as slices.
+///
+/// # Safety
+/// As [`surface`].
+pub(super) unsafe fn volume_in_view<'a>(
+    v: &RtvSceneVolume,
+    facts: &RtvVolumeFacts,
+    view: &RtvView,
+) -> Result<VolumeInView<'a>, String> {
+    // SAFETY: the caller's promise, for both arrays.
+    let [values, opacities]: [&[[f32; 1]]; 2] = unsafe {
+        [tuples(&v.scalars, "scalars", RTV_F32)?, tuples(&v.opacities, "opacities", RTV_F32)?]
+    };
+    Ok(VolumeInView {
+        values: values.as_flattened(),
+        dims: v.dims,
+        range: facts.range,
+        opacities: opacities.as_flattened(),
+        unit_distance: v.unit_distance,
+        sample_distance: v.sample_distance,
+        world_from_unit: DMat4::from_cols_array(&v.world_from_unit).transpose(),
+        clip_from_world: DMat4::from_cols_array(&view.clip_from_world).transpose(),
+        size: [view.width, view.height],
+        points: facts.dims.iter().map(|n| u64::from(*n)).product(),
+        shaded: facts.shade != 0,
+    })
 }
 
 fn property(p: &RtvProperty) -> Property {

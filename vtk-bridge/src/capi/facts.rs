@@ -1,6 +1,7 @@
 //! Facts about props, with C's layout: from them [`super::eligibility`] decides what is ray traced.
 //! Zero and null stand for what is not known yet or not there, and refuse nothing.
 
+use super::types::{RtvArray, RtvView};
 use std::os::raw::c_char;
 
 /// Representation of a property: every point.
@@ -218,7 +219,7 @@ pub const RTV_CHOICE_OPENGL: u32 = 1;
 /// The caller has to collect the scene's facts and ask again.
 pub const RTV_CHOICE_ASK_AGAIN: u32 = 2;
 
-/// A renderer's scene, for the choice between rays and OpenGL. The first three fields are always
+/// A renderer's scene, for the choice between rays and OpenGL. The first four fields are always
 /// set, the others only when rtv_choose asks for them.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
@@ -229,18 +230,48 @@ pub struct RtvSceneFacts {
     pub props: u32,
     /// 1 when the program itself asks for shadows.
     pub shadows: u32,
+    /// As in RtvView.
+    pub interactive: u32,
     /// 1 when the fields below are set.
     pub known: u32,
     /// 1 if OpenGL's driver works on the processor.
     pub software: u32,
     /// 1 for the Python package.
     pub python: u32,
-    /// Visible volumes.
+    /// Visible volumes; those that rtv_choose_volume was told of and others.
     pub volumes: u32,
+    /// Visible props in space, other than volumes, that have no polygons or more than polygons.
+    pub others: u32,
     /// Visible props with translucent surfaces.
     pub translucent: u32,
     /// Visible props with edges.
     pub edges: u32,
     /// Triangles of the visible props, in all copies.
     pub triangles: u64,
+}
+
+/// A visible volume of a scene, for the choice: what it is to draw. Its pipeline need not be up to
+/// date.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct RtvSceneVolume {
+    /// What rtv_check_volume would be asked with, but for range, which is that of the opacities.
+    pub facts: *const RtvVolumeFacts,
+    /// The view of the frame.
+    pub view: *const RtvView,
+    /// Scalars at a few points per axis, evenly spread from the first to the last: one RTV_F32
+    /// each, x fastest.
+    pub scalars: RtvArray,
+    /// How many per axis.
+    pub dims: [u32; 3],
+    /// 1 if OpenGL takes fewer samples while the user turns the scene.
+    pub adjusts: u32,
+    /// As in RtvVolume.
+    pub opacities: RtvArray,
+    /// As in RtvVolume.
+    pub unit_distance: f64,
+    /// As in RtvVolume.
+    pub sample_distance: f64,
+    /// World position of a point of the unit cube, which the image fills; row by row.
+    pub world_from_unit: [f64; 16],
 }

@@ -26,9 +26,6 @@ use state::{BridgeState, set_option, with};
 use std::ffi::CStr;
 use std::os::raw::c_char;
 
-/// Why OpenGL draws a volume among opaque surfaces that are traced.
-const VOLUME_LEFT: &str = "cheaper in OpenGL, and no effect needs rays (RTV_ALWAYS_TRACE=1 traces)";
-
 /// A renderer's side of the bridge.
 pub struct RtvBridge {
     _private: [u8; 0],
@@ -36,7 +33,7 @@ pub struct RtvBridge {
 
 /// Version of this interface, computed from its structures and calls (a test gives the value). A
 /// shim built for another version must not continue.
-pub const RTV_ABI: u32 = 2_667_571_646;
+pub const RTV_ABI: u32 = 3_248_043_196;
 
 /// [`RTV_ABI`] of the library.
 #[unsafe(no_mangle)]
@@ -141,6 +138,28 @@ pub unsafe extern "C" fn rtv_choose(bridge: *mut RtvBridge, facts: *const RtvSce
     let Some(f) = (unsafe { facts.as_ref() }) else { return RTV_CHOICE_RAYS };
     // SAFETY: as above.
     unsafe { with(bridge, RTV_CHOICE_RAYS, |h| h.choose(f)) }
+}
+
+/// Tells the choice of a visible volume: after rtv_choose has asked for facts, and before it is
+/// called with them.
+///
+/// # Safety
+/// As `rtv_begin`; `volume` is null or valid, and so are its facts and its view; every array has
+/// the length it says and is not written to during the call.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtv_choose_volume(bridge: *mut RtvBridge, volume: *const RtvSceneVolume) {
+    // SAFETY: as above.
+    let Some(v) = (unsafe { volume.as_ref() }) else { return };
+    // SAFETY: as above.
+    unsafe {
+        with(bridge, (), |h| {
+            let (Some(facts), Some(view)) = (v.facts.as_ref(), v.view.as_ref()) else { return };
+            let classes = [text(facts.volume_class), text(facts.mapper_class)];
+            if let Ok(volume) = arrays::volume_in_view(v, facts, view) {
+                h.choose_volume(&volume, facts, &classes, v.adjusts != 0 && view.interactive != 0);
+            }
+        })
+    }
 }
 
 /// Adds a surface: 1 if it will be traced, 0 if it has nothing to trace, -1 if its arrays are
@@ -319,7 +338,7 @@ pub unsafe extern "C" fn rtv_check_volume(
     unsafe {
         with(bridge, c"internal error".as_ptr(), |h| {
             let (volume, mapper) = (text(f.volume_class), text(f.mapper_class));
-            let cheaper = h.volumes_are_left().then(|| VOLUME_LEFT.to_owned());
+            let cheaper = h.why_volumes_are_left();
             h.reason(cheaper.or_else(|| eligibility::volume(f, &volume, &mapper).map(Into::into)))
         })
     }
@@ -455,6 +474,8 @@ pub struct RtvApi {
     pub check_volume: unsafe extern "C" fn(*mut RtvBridge, *const RtvVolumeFacts) -> *const c_char,
     /// [`rtv_choose`].
     pub choose: unsafe extern "C" fn(*mut RtvBridge, *const RtvSceneFacts) -> u32,
+    /// [`rtv_choose_volume`].
+    pub choose_volume: unsafe extern "C" fn(*mut RtvBridge, *const RtvSceneVolume),
 }
 
 static API: RtvApi = RtvApi {
@@ -482,6 +503,7 @@ static API: RtvApi = RtvApi {
     check_glyphs: rtv_check_glyphs,
     check_volume: rtv_check_volume,
     choose: rtv_choose,
+    choose_volume: rtv_choose_volume,
 };
 
 /// The table; valid as long as the library is loaded.

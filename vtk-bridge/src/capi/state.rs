@@ -2,9 +2,12 @@
 
 use super::eligibility::Radii;
 use super::{
-    RTV_CHOICE_ASK_AGAIN, RTV_CHOICE_OPENGL, RTV_CHOICE_RAYS, RtvBridge, RtvPicture, RtvSceneFacts,
+    RTV_BLEND_COMPOSITE, RTV_CHOICE_ASK_AGAIN, RTV_CHOICE_OPENGL, RTV_CHOICE_RAYS, RtvBridge,
+    RtvPicture, RtvSceneFacts, RtvVolumeFacts, eligibility,
 };
 use crate::bridge::Bridge;
+use crate::choice::media::Media;
+use crate::choice::volume_work::VolumeInView;
 use crate::choice::{Choice, SceneFacts, Way};
 use crate::input::View;
 use crate::options::{Options, readable};
@@ -27,6 +30,8 @@ pub(super) struct BridgeState {
     own: OptionValues,
     effective_options: EffectiveOptions,
     choice: Choice,
+    /// The volumes that this frame's choice was told of.
+    media: Media,
     /// Whether this frame leaves its volumes to OpenGL.
     volumes_left: bool,
     /// True between `rtv_begin` and `rtv_end`, while options must not change.
@@ -174,6 +179,7 @@ impl BridgeState {
             own: OptionValues::new(),
             effective_options: EffectiveOptions::NONE,
             choice: Choice::default(),
+            media: Media::default(),
             volumes_left: false,
             in_frame: false,
         }
@@ -216,6 +222,7 @@ impl BridgeState {
         }
         self.in_frame = !options.off;
         self.volumes_left = false;
+        self.media = Media::default();
         i32::from(!options.off && !self.poisoned)
     }
 
@@ -223,32 +230,55 @@ impl BridgeState {
     pub(super) fn choose(&mut self, f: &RtvSceneFacts) -> u32 {
         // Ranks trace alike, because their images are put together.
         if self.bridge.options().need_rays() || f.shadows != 0 || report::ranks() > 1 {
+            self.bridge.report_choice("rays: an option, shadows or several ranks need them");
             return RTV_CHOICE_RAYS;
         }
-        let facts = (f.known != 0).then_some(SceneFacts {
+        let media = std::mem::take(&mut self.media);
+        let facts = (f.known != 0).then(|| SceneFacts {
             pixels: f.pixels,
             props: f.props,
             triangles: f.triangles,
             volumes: f.volumes,
+            unknown_volumes: f.volumes.saturating_sub(media.known()),
+            media: media.costs(),
+            others: f.others,
             translucent: f.translucent,
             edges: f.edges,
             software: f.software != 0,
             python: f.python != 0,
+            interactive: f.interactive != 0,
         });
-        if facts.is_none() && self.choice.is_due(f.pixels, f.props) {
+        if facts.is_none() && self.choice.is_due(f.pixels, f.props, f.interactive != 0) {
             return RTV_CHOICE_ASK_AGAIN;
         }
-        match self.choice.decide(facts) {
+        let way = self.choice.decide(facts);
+        self.bridge.report_choice(&self.choice.reason());
+        self.volumes_left = self.choice.leaves_volumes();
+        match way {
             Way::OpenGl => RTV_CHOICE_OPENGL,
-            Way::Rays => {
-                self.volumes_left = self.choice.leaves_volumes();
-                RTV_CHOICE_RAYS
-            }
+            Way::Surfaces | Way::All => RTV_CHOICE_RAYS,
         }
     }
 
-    pub(super) fn volumes_are_left(&self) -> bool {
-        self.volumes_left
+    /// See `rtv_choose_volume`. A volume that is left out here is one that the model does not know.
+    pub(super) fn choose_volume(
+        &mut self,
+        volume: &VolumeInView<'_>,
+        facts: &RtvVolumeFacts,
+        [volume_class, mapper_class]: &[String; 2],
+        coarser: bool,
+    ) {
+        // What takes no samples at OpenGL's places has another picture, if only a little.
+        let sampled = facts.blend_mode == RTV_BLEND_COMPOSITE && facts.gradient_opacity == 0;
+        let traced = eligibility::volume(facts, volume_class, mapper_class).is_none();
+        if sampled && traced && !coarser {
+            self.media.add(volume);
+        }
+    }
+
+    /// Why this frame leaves its volumes to OpenGL, if it does.
+    pub(super) fn why_volumes_are_left(&self) -> Option<String> {
+        self.volumes_left.then(|| self.choice.reason_of_volumes())
     }
 
     pub(super) fn choice_reason(&self) -> String {

@@ -369,6 +369,75 @@ fn a_bridge_s_options_go_over_those_of_the_process_and_hold_for_a_frame() {
     }
 }
 
+/// The answers of twelve frames of one volume in a renderer of 1000 by 1000 pixels.
+fn chosen(change: impl Fn(&mut RtvVolumeFacts, &mut RtvSceneVolume)) -> Vec<u32> {
+    // SAFETY: all zero is no fact at all.
+    let (mut facts, mut volume, mut scene): (RtvVolumeFacts, RtvSceneVolume, RtvSceneFacts) =
+        unsafe { (std::mem::zeroed(), std::mem::zeroed(), std::mem::zeroed()) };
+    facts.volume_class = c"vtkVolume".as_ptr();
+    facts.mapper_class = c"vtkGPUVolumeRayCastMapper".as_ptr();
+    (facts.has_data, facts.image, facts.scalars, facts.num_components) = (1, 1, 1, 1);
+    (facts.dims, facts.range) = ([257; 3], [0.0, 1.0]);
+    // All of it is clear: cheaper with rays at every level.
+    let (values, opacities) = ([[1.0f32]; 8], [[0.0f32], [0.0]]);
+    (volume.scalars, volume.dims) = (array(&values, RTV_F32), [2; 3]);
+    volume.opacities = array(&opacities, RTV_F32);
+    (volume.unit_distance, volume.sample_distance) = (1.0, 1.0 / 256.0);
+    volume.world_from_unit = IDENTITY;
+    change(&mut facts, &mut volume);
+    let view = RtvView { width: 1000, height: 1000, ..view() };
+    (volume.facts, volume.view) = (&facts, &view);
+    (scene.pixels, scene.props) = (1_000_000, 1);
+    let known = RtvSceneFacts { known: 1, software: 1, volumes: 1, ..scene };
+    let bridge = rtv_new();
+    // SAFETY: everything lives until the end of this function, and lengths are those of slices.
+    let answers = (0..12).map(|_| unsafe {
+        rtv_begin(bridge);
+        let mut answer = rtv_choose(bridge, &scene);
+        if answer == RTV_CHOICE_ASK_AGAIN {
+            rtv_choose_volume(bridge, &volume);
+            answer = rtv_choose(bridge, &known);
+        }
+        rtv_end(bridge);
+        answer
+    });
+    let answers = answers.collect();
+    // SAFETY: it is not used afterwards.
+    unsafe { rtv_free(bridge) };
+    answers
+}
+
+#[test]
+fn a_volume_that_c_describes_goes_to_whoever_is_cheaper() {
+    let traced = chosen(|_, _| ());
+    let fast = rt_core::simd::SimdLevel::available().contains(&rt_core::simd::SimdLevel::Avx512);
+    let expected = if fast { RTV_CHOICE_RAYS } else { traced[11] };
+    assert_eq!((traced[0], traced[11]), (RTV_CHOICE_OPENGL, expected), "{traced:?}");
+    let changes: [fn(&mut RtvVolumeFacts, &mut RtvSceneVolume); 8] = [
+        |_, v| v.sample_distance = 0.5,
+        // Not traced, or not as OpenGL samples it.
+        |f, _| f.num_components = 3,
+        |f, _| f.cropping = 1,
+        |f, _| f.blend_mode = RTV_BLEND_MAXIMUM,
+        |_, v| v.sample_distance = 0.0,
+        // Faults of the caller.
+        |_, v| v.dims = [3; 3],
+        |_, v| v.scalars.kind = RTV_F64,
+        |_, v| v.world_from_unit = [f64::NAN; 16],
+    ];
+    for (k, change) in changes.into_iter().enumerate() {
+        assert!(chosen(change).iter().all(|a| *a == RTV_CHOICE_OPENGL), "change {k}");
+    }
+    // SAFETY: null is allowed everywhere.
+    unsafe {
+        rtv_choose_volume(ptr::null_mut(), ptr::null());
+        let bridge = rtv_new();
+        rtv_choose_volume(bridge, ptr::null());
+        rtv_choose_volume(bridge, &std::mem::zeroed());
+        rtv_free(bridge);
+    }
+}
+
 /// A panic that reaches C ends the program that we are a guest of.
 #[test]
 fn every_call_from_c_stops_panics() {

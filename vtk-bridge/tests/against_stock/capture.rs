@@ -60,6 +60,12 @@ impl Capture {
         lists.flatten().filter_map(|p| p[key].as_str().map(str::to_owned)).collect()
     }
 
+    /// Who draws where the picture is the same either way, and why, as the last renderer says.
+    pub(crate) fn choice(&self) -> String {
+        let last = self.renderers().last().and_then(|r| r["choice"].as_str());
+        last.unwrap_or_default().to_owned()
+    }
+
     /// The reasons that the script expects, in the order of its props.
     pub(crate) fn expected_reasons(&self) -> Vec<String> {
         let reasons = self.facts["reasons"].as_array().map_or(&[][..], Vec::as_slice);

@@ -7,6 +7,7 @@
 
 mod capture;
 mod cells;
+mod choice;
 mod compare;
 mod effects;
 mod gui;

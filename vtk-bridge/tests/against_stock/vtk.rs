@@ -30,7 +30,7 @@ fn both() -> Option<&'static Both> {
 }
 
 /// Limits for shaded volumes.
-const SHADED: Limits = Limits { color_mean: 1.5, ..Limits::STRICT };
+pub(crate) const SHADED: Limits = Limits { color_mean: 1.5, ..Limits::STRICT };
 /// Limits for volumes with gradient opacity.
 const GRADIENT_OPACITY: Limits = Limits { color_mean: 2.5, color_strays: 0.002, ..Limits::STRICT };
 /// Limits for isosurfaces of volumes.

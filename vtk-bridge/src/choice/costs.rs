@@ -1,0 +1,183 @@
+//! The model: what a frame costs in OpenGL and with rays.
+//!
+//! All numbers are milliseconds of CPU, summed over the threads. Those of OpenGL are llvmpipe's.
+
+use super::volume_work::VolumeWork;
+use super::{SceneFacts, Way};
+use rt_core::simd::SimdLevel;
+
+/// What a part of a frame costs in both ways.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct PartCosts {
+    /// In a frame of OpenGL.
+    pub opengl: f64,
+    /// In a frame of rays.
+    pub rays: f64,
+    /// What its first frame of rays costs beyond that.
+    pub build: f64,
+}
+
+impl std::ops::AddAssign for PartCosts {
+    fn add_assign(&mut self, other: PartCosts) {
+        self.opengl += other.opengl;
+        self.rays += other.rays;
+        self.build += other.build;
+    }
+}
+
+/// Nanoseconds of CPU for a sample of a volume, each in a grid that lies in the caches and in one
+/// that does not.
+#[derive(Debug, Clone, Copy)]
+struct SampleCosts {
+    /// Of every sample.
+    any: [f64; 2],
+    /// What a sample with an opacity adds.
+    seen: [f64; 2],
+    /// What its light adds.
+    light: [f64; 2],
+}
+
+// The constants of volumes come from `vtk-bridge/python/measure_volumes.py`, whole frames of the
+// wheel's VTK 9.7 with EGL and llvmpipe, and of rtvtk with the library of the development profile,
+// in turns on an EPYC with AVX-512 that others used too. A nearly empty frame (--zoom 0.05) gives
+// what a pixel costs; then, at a distance of samples of one point:
+//
+//     points, pixels   what is seen      stock, ms   rtvtk, ms   samples, M   seen, M
+//     65^3, 512^2      nearly nothing    1.2         57          0            0
+//     65^3, 512^2      all               111         156         5.45         5.45
+//     65^3, 512^2      all, shaded       342         303         5.45         5.45
+//     65^3, 512^2      half              123         124         5.45         1.99
+//     65^3, 512^2      dense core        96          107         4.48         0.50
+//     129^3, 512^2     all               237         217         10.85        10.85
+//     257^3, 256^2     all               226         176         5.40         5.40
+//     257^3, 256^2     all, shaded       602         454         5.40         5.40
+//     257^3, 256^2     half              216         139         5.40         1.98
+
+/// Points of the largest grid that lies in the caches, and of one that does not.
+const POINTS: [f64; 2] = [129.0 * 129.0 * 129.0, 257.0 * 257.0 * 257.0];
+const OPENGL_SAMPLE: SampleCosts =
+    SampleCosts { any: [20.0, 39.0], seen: [0.0, 3.0], light: [42.0, 70.0] };
+/// With AVX-512.
+const RAYS_SAMPLE: SampleCosts =
+    SampleCosts { any: [9.1, 19.0], seen: [9.1, 11.0], light: [27.0, 51.0] };
+/// How many times as long rays take with other instructions. With SSE2 the loops alone were
+/// measured, at 0.85 to 1.2 times the speed of OpenGL's where AVX-512 has 1.2 to 2.5. AVX2 was not
+/// measured; in between, and rather too slow.
+const SLOWER: [(SimdLevel, f64); 2] = [(SimdLevel::Avx512, 1.0), (SimdLevel::Avx2, 1.4)];
+const SLOWEST: f64 = 2.0;
+/// Milliseconds of a frame of rays with a volume for a million pixels: it has layers to blend.
+const LAYERS: f64 = 216.0;
+/// Milliseconds of OpenGL's frame of volumes alone for a million pixels, beside their samples.
+const EMPTY: f64 = 4.5;
+/// Nanoseconds for a point of a volume, when rays first draw it.
+const BUILD_POINT: f64 = 20.0;
+
+impl SampleCosts {
+    /// Milliseconds of all samples.
+    fn of(&self, work: &VolumeWork) -> f64 {
+        let [small, large] = POINTS.map(f64::ln);
+        let part = (((work.points.max(1) as f64).ln() - small) / (large - small)).clamp(0.0, 1.0);
+        let at = |[small, large]: [f64; 2]| small + (large - small) * part;
+        let light = if work.shaded { at(self.light) } else { 0.0 };
+        1e-6 * (at(self.any) * work.samples + (at(self.seen) + light) * work.seen)
+    }
+}
+
+impl PartCosts {
+    /// A volume's part of a frame, with rays at this level.
+    pub fn of_volume(work: &VolumeWork, level: Option<SimdLevel>) -> PartCosts {
+        let known = SLOWER.iter().find(|(known, _)| Some(*known) == level);
+        let slower = known.map_or(SLOWEST, |(_, factor)| *factor);
+        PartCosts {
+            opengl: OPENGL_SAMPLE.of(work),
+            rays: slower * RAYS_SAMPLE.of(work),
+            build: 1e-6 * BUILD_POINT * work.points as f64,
+        }
+    }
+
+    /// What a frame costs without its volumes.
+    fn of_the_rest(f: &SceneFacts) -> PartCosts {
+        let (megapixels, mega) = (f.pixels as f64 * 1e-6, f.triangles as f64 * 1e-6);
+        let props = f64::from(f.props);
+        let (veils, edges) = (f.translucent > 0, f.edges > 0);
+        let alone = f.volumes > 0 && f.triangles == 0;
+        let opengl = if alone { EMPTY } else { 38.0 } * megapixels
+            + mega * if edges { 500.0 } else { 300.0 }
+            + 0.04 * props
+            + if veils { 20.0 * megapixels } else { 0.0 };
+        let pixel = match (veils, edges) {
+            (true, _) => 240.0,
+            (_, true) => 150.0,
+            _ if alone => 0.0,
+            _ => 75.0,
+        };
+        let rays = pixel * megapixels + 6.0 * mega + props * if f.python { 0.12 } else { 0.03 };
+        PartCosts { opengl, rays, build: 400.0 * mega + 2.0 }
+    }
+
+    /// What blending adds to a frame of rays with volumes.
+    fn of_layers(f: &SceneFacts) -> f64 {
+        let blended = f.volumes > f.unknown_volumes && f.translucent == 0;
+        if blended { LAYERS * 1e-6 * f.pixels as f64 } else { 0.0 }
+    }
+}
+
+/// What a frame costs each way, and what its first frame costs beyond that. Infinite where that way
+/// would not give OpenGL's picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Costs {
+    opengl: f64,
+    surfaces: [f64; 2],
+    all: [f64; 2],
+}
+
+impl Costs {
+    /// The model.
+    pub fn of(f: &SceneFacts) -> Costs {
+        const NEVER: [f64; 2] = [f64::INFINITY; 2];
+        if !f.software {
+            // That was not measured.
+            return Costs { opengl: 0.0, surfaces: NEVER, all: NEVER };
+        }
+        let (rest, media) = (PartCosts::of_the_rest(f), f.media);
+        let apart = f.volumes > 0 && f.triangles > 0 && f.translucent == 0;
+        let together =
+            f.volumes == 0 || f.translucent > 0 || f.unknown_volumes == 0 && f.others == 0;
+        let surfaces = [rest.rays + media.opengl, rest.build];
+        let all = [rest.rays + PartCosts::of_layers(f) + media.rays, rest.build + media.build];
+        Costs {
+            opengl: rest.opengl + media.opengl,
+            surfaces: if apart { surfaces } else { NEVER },
+            all: if together { all } else { NEVER },
+        }
+    }
+
+    /// Milliseconds of a frame.
+    pub fn frame(&self, way: Way) -> f64 {
+        match way {
+            Way::OpenGl => self.opengl,
+            Way::Surfaces => self.surfaces[0],
+            Way::All => self.all[0],
+        }
+    }
+
+    /// What the first frame costs beyond that.
+    pub fn build(&self, way: Way) -> f64 {
+        match way {
+            Way::OpenGl => 0.0,
+            Way::Surfaces => self.surfaces[1],
+            Way::All => self.all[1],
+        }
+    }
+
+    /// The cheapest way; OpenGL where others are no cheaper.
+    pub fn best(&self) -> Way {
+        let rays = self.best_of_rays();
+        if self.frame(rays) < self.frame(Way::OpenGl) { rays } else { Way::OpenGl }
+    }
+
+    /// The cheaper way with rays.
+    pub fn best_of_rays(&self) -> Way {
+        if self.surfaces[0] < self.all[0] { Way::Surfaces } else { Way::All }
+    }
+}
