@@ -33,33 +33,45 @@ struct SampleCosts {
     any: [f64; 2],
     /// What a sample with an opacity adds.
     seen: [f64; 2],
-    /// What its light adds.
+    /// What light adds to every sample, seen or not.
     light: [f64; 2],
+    /// What light adds to a sample with an opacity.
+    light_of_seen: [f64; 2],
 }
 
 // The constants of volumes come from `vtk-bridge/python/measure_volumes.py`, whole frames of the
 // wheel's VTK 9.7 with EGL and llvmpipe, and of rtvtk with the library of the development profile,
-// in turns on an EPYC with AVX-512 that others used too. A nearly empty frame (--zoom 0.05) gives
-// what a pixel costs; then, at a distance of samples of one point:
+// in turns, once each, on an EPYC with AVX-512 that others used too. A nearly empty frame (--zoom
+// 0.05) gives what a pixel costs; then, at a distance of samples of one point:
 //
 //     points, pixels   what is seen      stock, ms   rtvtk, ms   samples, M   seen, M
 //     65^3, 512^2      nearly nothing    1.2         57          0            0
 //     65^3, 512^2      all               111         156         5.45         5.45
 //     65^3, 512^2      all, shaded       342         303         5.45         5.45
 //     65^3, 512^2      half              123         124         5.45         1.99
+//     65^3, 512^2      half, shaded      327         189         5.45         1.99
 //     65^3, 512^2      dense core        96          107         4.48         0.50
 //     129^3, 512^2     all               237         217         10.85        10.85
+//     129^3, 512^2     all, shaded       727         629         10.85        10.85
 //     257^3, 256^2     all               226         176         5.40         5.40
 //     257^3, 256^2     all, shaded       602         454         5.40         5.40
 //     257^3, 256^2     half              216         139         5.40         1.98
 
 /// Points of the largest grid that lies in the caches, and of one that does not.
 const POINTS: [f64; 2] = [129.0 * 129.0 * 129.0, 257.0 * 257.0 * 257.0];
-const OPENGL_SAMPLE: SampleCosts =
-    SampleCosts { any: [20.0, 39.0], seen: [0.0, 3.0], light: [42.0, 70.0] };
+const OPENGL_SAMPLE: SampleCosts = SampleCosts {
+    any: [20.0, 39.0],
+    seen: [0.0, 3.0],
+    light: [42.0, 70.0],
+    light_of_seen: [0.0; 2],
+};
 /// With AVX-512.
-const RAYS_SAMPLE: SampleCosts =
-    SampleCosts { any: [9.1, 19.0], seen: [9.1, 11.0], light: [27.0, 51.0] };
+const RAYS_SAMPLE: SampleCosts = SampleCosts {
+    any: [9.1, 19.0],
+    seen: [9.1, 11.0],
+    light: [0.0; 2],
+    light_of_seen: [27.0, 51.0],
+};
 /// How many times as long rays take with other instructions. With SSE2 the loops alone were
 /// measured, at 0.85 to 1.2 times the speed of OpenGL's where AVX-512 has 1.2 to 2.5. AVX2 was not
 /// measured; in between, and rather too slow.
@@ -78,8 +90,10 @@ impl SampleCosts {
         let [small, large] = POINTS.map(f64::ln);
         let part = (((work.points.max(1) as f64).ln() - small) / (large - small)).clamp(0.0, 1.0);
         let at = |[small, large]: [f64; 2]| small + (large - small) * part;
-        let light = if work.shaded { at(self.light) } else { 0.0 };
-        1e-6 * (at(self.any) * work.samples + (at(self.seen) + light) * work.seen)
+        let lit = |pair| if work.shaded { at(pair) } else { 0.0 };
+        let any = at(self.any) + lit(self.light);
+        let seen = at(self.seen) + lit(self.light_of_seen);
+        1e-6 * (any * work.samples + seen * work.seen)
     }
 }
 
