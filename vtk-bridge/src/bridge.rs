@@ -79,7 +79,7 @@ pub struct Bridge {
     warned: HashSet<String>,
     /// Warnings that were not read yet.
     fresh_warnings: Vec<String>,
-    report: FrameReport,
+    pub(crate) report: FrameReport,
     /// Milliseconds by effect, for each set of effects that was measured.
     costs: HashMap<Vec<&'static str>, Vec<(String, f64)>>,
 }
@@ -284,11 +284,6 @@ impl Bridge {
     /// Records for the report something that OpenGL draws, and why.
     pub fn report_untraced(&mut self, name: &str, reason: &str) {
         self.report.passed.push(UntracedItem { name: name.to_owned(), reason: reason.to_owned() });
-    }
-
-    /// Records for the report who draws this frame, and why.
-    pub fn report_choice(&mut self, why: &str) {
-        self.report.choice = why.to_owned();
     }
 
     /// The number of surfaces added this frame.

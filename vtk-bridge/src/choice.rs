@@ -294,7 +294,8 @@ mod tests {
     fn the_same_sequence_of_volumes_is_drawn_in_the_same_way() {
         let sequence = || {
             let mut choice = Choice::default();
-            let next = |k: u32| choice.decide(Some(volume(40 * k % 301 + 2, k % 3 == 0, BEST)));
+            let next =
+                |k: u32| choice.decide(Some(volume(40 * k % 301 + 2, k.is_multiple_of(3), BEST)));
             (0..200).map(next).collect::<Vec<Way>>()
         };
         let first = sequence();

@@ -230,7 +230,8 @@ impl BridgeState {
     pub(super) fn choose(&mut self, f: &RtvSceneFacts) -> u32 {
         // Ranks trace alike, because their images are put together.
         if self.bridge.options().need_rays() || f.shadows != 0 || report::ranks() > 1 {
-            self.bridge.report_choice("rays: an option, shadows or several ranks need them");
+            let why = "rays: an option, shadows or several ranks need them";
+            self.bridge.report.choice = why.to_owned();
             return RTV_CHOICE_RAYS;
         }
         let media = std::mem::take(&mut self.media);
@@ -252,7 +253,7 @@ impl BridgeState {
             return RTV_CHOICE_ASK_AGAIN;
         }
         let way = self.choice.decide(facts);
-        self.bridge.report_choice(&self.choice.reason());
+        self.bridge.report.choice = self.choice.reason();
         self.volumes_left = self.choice.leaves_volumes();
         match way {
             Way::OpenGl => RTV_CHOICE_OPENGL,

@@ -99,7 +99,8 @@ impl VolumeInView<'_> {
             // make the interval empty, as intended.
             (near, far) = (near.max(u.min(v)), far.min(u.max(v)));
         }
-        if !(near < far) {
+        // Neither is NaN, which `max` and `min` leave out.
+        if near >= far {
             return;
         }
         let length = self.world_from_unit.transform_vector3(along * (far - near)).length();

@@ -6,7 +6,7 @@ use crate::session::{Program, Run, With, output, scripts_in};
 use crate::vtk::SHADED;
 use rt_core::simd::SimdLevel;
 
-/// Images of `volume_alone`, whether rays draw them (with AVX-512), and how near to stock's they are.
+/// Images of `volume_alone`, whether rays draw them with AVX-512, and how near to stock's they are.
 const IMAGES: [(&str, bool, Limits); 8] = [
     ("first", false, Limits::STRICT),
     ("large", true, Limits::STRICT),
