@@ -7,6 +7,7 @@
 //! counts what a conversion leaves out.
 
 pub mod array;
+mod axisymmetric;
 mod boundary_faces;
 pub mod cells;
 pub mod coloring;

@@ -166,6 +166,9 @@ fn a_case_between_wedges_has_the_radius_as_y() {
         assert!((p - glam::DVec3::from(nearest)).abs().max_element() < 1e-14, "{p}");
     }
     assert!(flat.warnings.join("\n").contains("axisymmetric"));
+    assert!(flat.dataset().unwrap().is_axisymmetric());
+    let plane = read(&case(Form::Binary, "empty"));
+    assert!(!plane.dataset().unwrap().is_axisymmetric());
 }
 
 #[test]

@@ -137,6 +137,46 @@ fn a_body_between_layers_stays_a_hole() {
 }
 
 #[test]
+fn a_radius_is_the_second_axis_of_a_plane_unless_there_is_another() {
+    // Scattered, as CFD-Post and Fluent name the columns, and as COMSOL does.
+    for (along, radius, unit) in [
+        ("x", "r", ""),
+        ("X [ m ]", "Radial Coordinate [ m ]", ""),
+        ("x-coordinate", "radius (mm)", "in mm by their names"),
+        ("axial-coordinate", "radial-coordinate", ""),
+        ("Z", "R", ""),
+    ] {
+        let text = cloud(300, 2).replace("x,y,rho", &format!("{radius},{along},rho"));
+        let file = read(&text).unwrap();
+        let g = mesh(&file);
+        assert_eq!((g.types[0], file.dataset().unwrap().is_axisymmetric()), (5, true), "{along}");
+        let names: Vec<&str> = g.attributes.point.iter().map(|a| a.name.as_str()).collect();
+        assert_eq!(names, ["rho"]);
+        // The columns are exchanged: x is the second.
+        let (first, second) = (scatter(0), scatter(1));
+        let at = glam::DVec3::new(second, first, 0.0);
+        assert!((0..300).any(|i| g.points.get(i) == at), "{along}");
+        let said = file.warnings.join("\n");
+        let words = format!("x is `{along}`, along the axis, and y is `{radius}`, the distance");
+        assert!(said.contains(&words) && said.contains(unit), "{said}");
+    }
+    // A lattice.
+    let file = read("x,r,T\n0,0,1\n0,2,2\n1,0,3\n1,2,4\n").unwrap();
+    assert_eq!(lattice(&file).coordinates, [vec![0.0, 1.0], vec![0.0, 2.0], vec![0.0]]);
+    assert!(file.dataset().unwrap().is_axisymmetric());
+    // With y, or with x and z, a radius is a value.
+    for header in ["x,y,r", "x,z,r"] {
+        let file = read(&cloud(300, 2).replace("x,y,rho", header)).unwrap();
+        assert_eq!(mesh(&file).attributes.point[0].name, "r");
+        assert!(!file.dataset().unwrap().is_axisymmetric(), "{header}");
+    }
+    // All around the axis.
+    let error = read("x,r,theta\n0,1,0\n1,1,90\n0,2,180\n").unwrap_err();
+    assert!(error.contains("angles `theta`; write x, y and z of the points"), "{error}");
+    assert!(mesh(&read("x,r,theta\n0,1,0\n1,1,0\n0,2,0\n").unwrap()).types == [5]);
+}
+
+#[test]
 fn rows_are_joined_left_out_and_marked_and_all_is_counted() {
     let text = "X (mm),Y (mm),Z (mm),T\n0,0,5,1\n4,0,5,2\n0,4,5,3\n4,3,5,4\n1,2,5,5\n1,2,5,9\n\
                 4,0,5,2\n,1,5,1\nnan,1,5,1\n2,1,5,\n";
@@ -169,7 +209,10 @@ fn what_has_no_mesh_is_refused_with_file_line_and_cure() {
         ("x,y,T\n1,1,1\n1,1,1\n", "1 different points, all on one line"),
         ("x,y,T\n,1,1\n", "0 different points"),
         ("x,y,T\n", "0 different points"),
-        ("a,b\n1,2\n", "no column with coordinates among `a`, `b`; name those x, y and z"),
+        (
+            "a,b\n1,2\n",
+            "no column with coordinates among `a`, `b`; name those x, y and z, or x and r",
+        ),
         ("x,y,T\n0,0,1\n1,far,2\n", "in line 3: column `y`: `far` is not a number; write"),
         ("x,y,T\n0,0,1\n1,1e999,2\n", "in line 3: column `y`: `1e999` is not a number"),
     ] {

@@ -119,3 +119,52 @@ fn the_body_in_a_plane_of_points_is_solid() {
     let expected = 100.0 * TAU / 2.0 / (2.0 * outer).powi(2);
     assert!((bodies / expected - 1.0).abs() < 0.1, "{bodies} % of {expected} %");
 }
+
+#[test]
+fn a_table_with_a_radius_is_revolved() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("jet.csv");
+    let truth = |x: f64, r: f64| 1.2 - 0.4 * x - 0.3 * (-r * r / 0.02).exp();
+    let mut text = String::from("Radial Coordinate [ m ],X [ m ],density\n");
+    let mut random = SplitMix64::new(5);
+    for i in 0..6000 {
+        // Some on the axis and on the other borders.
+        let border = |x: f64, i: usize| {
+            if i < 60 {
+                0.0
+            } else if i < 120 {
+                1.0
+            } else {
+                x
+            }
+        };
+        let x = border(random.between(0.0, 1.0), (i + 3000) % 6000);
+        let r = 0.5 * border(random.between(0.0, 1.0), i);
+        writeln!(text, "{r},{x},{}", truth(x, r)).unwrap();
+    }
+    std::fs::write(&path, text).unwrap();
+    let found = contents(&path, &Default::default()).unwrap();
+    let guess = found.guess.unwrap();
+    assert!(guess.options.contains(&("--revolve", String::new())), "{guess:?}");
+    let options =
+        Options { depth: Some(Depth::Revolve), ..Options::new(Medium::density("density")) };
+    let field = load(&path, &options).unwrap().field;
+    // The flow is round about x, and `eps` its n - 1 apart from a constant and a factor.
+    let (size, low) = (field.size_m(), field.origin_m());
+    assert!((size.y - 1.0).abs() < 0.05 && (size.z / size.y - 1.0).abs() < 1e-9, "{size}");
+    let [nx, ny, nz] = field.dims();
+    let of = |at: [usize; 3]| {
+        let step = DVec3::from(field.spacing_m());
+        let p = low + step * DVec3::from(at.map(|i| i as f64));
+        let eps = f64::from(field.eps()[at[0] + nx * (at[1] + ny * at[2])]);
+        (eps, truth(p.x, p.y.hypot(p.z)))
+    };
+    // Gladstone and Dale's constant of air is 2.23e-4 to 2.3e-4 m3/kg in the visible.
+    let middle = [nx / 2, ny / 2, nz / 2];
+    let (eps, rho) = of(middle);
+    for at in [[nx / 4, ny / 2, nz / 2], [nx / 2, 3 * ny / 4, nz / 2], [nx / 2, ny / 2, nz / 5]] {
+        let (other_eps, other_rho) = of(at);
+        let slope = (other_eps - eps) / (other_rho - rho);
+        assert!((2.2e-4..2.32e-4).contains(&slope), "{at:?}: {slope}");
+    }
+}

@@ -25,6 +25,22 @@ const NAMES: &[&str] = &[
     "position[x]",
 ];
 
+/// Names, as in [`NAMES`], of the radius, of the coordinate along the axis, and of the angle about
+/// it in axisymmetric tables. `Radial Coordinate` is Fluent's and CFD-Post's, `r` with `z` COMSOL's.
+const RADII: &[&str] = &[
+    "r",
+    "radius",
+    "radial_coordinate",
+    "r_coordinate",
+    "r_coord",
+    "coordinate_r",
+    "coordinater",
+    "radial_position",
+];
+const AXIAL: &[&str] = &["axial_coordinate", "axial_position"];
+const ANGLES: &[&str] =
+    &["theta", "azimuth", "angular_coordinate", "theta_coordinate", "coordinatetheta"];
+
 /// Units of length that names of columns have.
 const UNITS: &[(&str, f64)] =
     &[("m", 1.0), ("mm", 1e-3), ("cm", 1e-2), ("um", 1e-6), ("in", 0.0254), ("ft", 0.3048)];
@@ -32,39 +48,73 @@ const UNITS: &[(&str, f64)] =
 /// Cells that say that there is no value.
 const MISSING: &[&str] = &["", "nan", "-nan", "na", "n/a", "null", "none", "-", "--"];
 
+/// What a column is by its name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Place {
+    /// x, y or z.
+    Axis(usize),
+    /// The coordinate along the axis of symmetry.
+    Axial,
+    /// The distance from it.
+    Radius,
+    /// The angle about it.
+    Angle,
+}
+
 /// The columns of a table of points.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Columns {
-    /// Columns of x, y and z. There is an x or, without it, an error.
+    /// Columns of x, y and z. There is an x or, without it, an error. In axisymmetric tables x is
+    /// along the axis, y is the radius, and there is no z.
     pub(crate) coordinates: [Option<usize>; 3],
     /// Columns with numbers.
     values: Vec<usize>,
+    /// Whether y is a radius by its name.
+    pub(crate) axisymmetric: bool,
     /// The unit of x by its name, with metres per unit, unless it is the metre.
     pub(crate) unit: Option<(&'static str, f64)>,
 }
 
 impl Columns {
-    /// Finds the columns.
+    /// Finds the columns. A radius is a coordinate where the table has no other one across the
+    /// axis: in a table of `x`, `y` and `radius` it is a value.
     ///
     /// # Errors
-    /// If there is no x.
+    /// If there is no x, or if an axisymmetric table has several angles.
     pub(crate) fn find(table: &CsvTable) -> Result<Columns, ReadError> {
-        let mut coordinates = [None; 3];
-        let mut unit = None;
-        for (i, name) in table.columns().iter().enumerate() {
-            if let Some((axis, of_name)) = axis(name)
-                && coordinates[axis].is_none()
+        let fault = |what: String, cure: &str| {
+            Fault::new(At::Field("the table".into()), what, cure).in_file(table.path(), FORMAT)
+        };
+        let places: Vec<_> = table.columns().iter().map(|name| place(name)).collect();
+        let first = |wanted: Place| places.iter().position(|p| p.is_some_and(|p| p.0 == wanted));
+        let mut coordinates = [0, 1, 2].map(|axis| first(Place::Axis(axis)));
+        let along = match coordinates {
+            [x, None, None] => x.or_else(|| first(Place::Axial)),
+            // The axis is z where there is no x.
+            [None, None, z] => z,
+            _ => None,
+        };
+        let radial = along.zip(first(Place::Radius));
+        if let Some((along, radius)) = radial {
+            coordinates = [Some(along), Some(radius), None];
+            if let Some(angle) = first(Place::Angle)
+                && differs(table, angle)
             {
-                coordinates[axis] = Some(i);
-                unit = unit.or(of_name);
+                let name = &table.columns()[angle];
+                return Err(fault(
+                    format!("cylindrical coordinates: a radius, and different angles `{name}`"),
+                    "write x, y and z of the points, or rename the column if it is no place",
+                ));
             }
         }
         if coordinates[0].is_none() {
             let names = table.columns().iter().map(|c| format!("`{c}`")).collect::<Vec<_>>();
             let what = format!("there is no column with coordinates among {}", names.join(", "));
-            let at = At::Field("the table".into());
-            return Err(Fault::new(at, what, "name those x, y and z").in_file(table.path(), FORMAT));
+            let cure = "name those x, y and z, or x and r if the flow is axisymmetric";
+            return Err(fault(what, cure));
         }
+        let units = coordinates.iter().flatten().filter_map(|c| places[*c]?.1);
+        let unit = units.into_iter().next();
         // Columns of text, as names of regions, are left out, as are columns without any value.
         let is_number = |c: &usize| {
             let mut cells = (0..table.len()).map(|r| table.cell(r, *c));
@@ -74,7 +124,7 @@ impl Columns {
         let values = (0..table.columns().len()).filter(|i| !coordinates.contains(&Some(*i)));
         let values = values.filter(is_number).collect();
         let unit = unit.filter(|(_, metres)| *metres != 1.0);
-        Ok(Columns { coordinates, values, unit })
+        Ok(Columns { coordinates, values, axisymmetric: radial.is_some(), unit })
     }
 
     /// The coordinates of each row along an axis: 0 where the table has no column for it, NaN where
@@ -97,8 +147,15 @@ pub(crate) fn array(name: &str, values: Vec<f64>) -> DataArray {
     DataArray::new(name, 1, Values::F64(values))
 }
 
-/// The axis that a column is of, and its unit.
-fn axis(name: &str) -> Option<(usize, Option<(&'static str, f64)>)> {
+/// Whether a column has different numbers.
+fn differs(table: &CsvTable, column: usize) -> bool {
+    let mut numbers = (0..table.len()).filter_map(|r| table.cell(r, column).parse::<f64>().ok());
+    let first = numbers.next();
+    numbers.any(|n| Some(n) != first)
+}
+
+/// What a column is by its name, and its unit.
+fn place(name: &str) -> Option<(Place, Option<(&'static str, f64)>)> {
     let name = name.trim().to_lowercase().replace(['-', ' '], "_");
     // Brackets with a unit come last: `x (mm)`, `X [ m ]`, `Centroid[X] (m)`.
     let brackets = name.find(['(', '[']).filter(|at| {
@@ -116,8 +173,15 @@ fn axis(name: &str) -> Option<(usize, Option<(&'static str, f64)>)> {
     };
     let plain = plain.trim_end_matches('_');
     let unit = UNITS.iter().find(|u| u.0 == unit).copied();
-    let axis = (0..3).find(|axis| NAMES.iter().any(|n| of_axis(n, *axis) == plain))?;
-    Some((axis, unit))
+    let of_axes = (0..3).find(|axis| NAMES.iter().any(|n| of_axis(n, *axis) == plain));
+    let place = match of_axes {
+        Some(axis) => Place::Axis(axis),
+        None if RADII.contains(&plain) => Place::Radius,
+        None if AXIAL.contains(&plain) => Place::Axial,
+        None if ANGLES.contains(&plain) => Place::Angle,
+        None => return None,
+    };
+    Some((place, unit))
 }
 
 /// A name of [`NAMES`] for another axis.
@@ -154,20 +218,30 @@ mod tests {
 
     #[test]
     fn names_of_programs_are_known_with_their_units() {
+        use Place::{Angle, Axial, Axis, Radius};
         for (name, expected) in [
-            ("x", Some((0, None))),
-            ("Y_m", Some((1, Some("m")))),
-            ("Points:2", Some((2, None))),
-            ("points_1", Some((1, None))),
-            ("x-coordinate", Some((0, None))),
-            ("    z-coordinate", Some((2, None))),
-            ("X (mm)", Some((0, Some("mm")))),
-            ("Y [ m ]", Some((1, Some("m")))),
-            ("Centroid[Z] (m)", Some((2, Some("m")))),
-            ("Position[X] (mm)", Some((0, Some("mm")))),
-            ("CoordinateY", Some((1, None))),
-            ("coordinate_z", Some((2, None))),
-            ("z_mm", Some((2, Some("mm")))),
+            ("x", Some((Axis(0), None))),
+            ("Y_m", Some((Axis(1), Some("m")))),
+            ("Points:2", Some((Axis(2), None))),
+            ("points_1", Some((Axis(1), None))),
+            ("x-coordinate", Some((Axis(0), None))),
+            ("    z-coordinate", Some((Axis(2), None))),
+            ("X (mm)", Some((Axis(0), Some("mm")))),
+            ("Y [ m ]", Some((Axis(1), Some("m")))),
+            ("Centroid[Z] (m)", Some((Axis(2), Some("m")))),
+            ("Position[X] (mm)", Some((Axis(0), Some("mm")))),
+            ("CoordinateY", Some((Axis(1), None))),
+            ("coordinate_z", Some((Axis(2), None))),
+            ("z_mm", Some((Axis(2), Some("mm")))),
+            ("r", Some((Radius, None))),
+            ("Radial Coordinate [ m ]", Some((Radius, Some("m")))),
+            ("    radial-coordinate", Some((Radius, None))),
+            ("radius (mm)", Some((Radius, Some("mm")))),
+            ("r_mm", Some((Radius, Some("mm")))),
+            ("axial-coordinate", Some((Axial, None))),
+            ("theta", Some((Angle, None))),
+            ("rho", None),
+            ("radial-velocity", None),
             ("x-velocity", None),
             ("Velocity[i] (m/s)", None),
             ("exhaust", None),
@@ -176,7 +250,7 @@ mod tests {
             ("[x]", None),
             ("(", None),
         ] {
-            let found = axis(name).map(|(a, u)| (a, u.map(|u| u.0)));
+            let found = place(name).map(|(a, u)| (a, u.map(|u| u.0)));
             assert_eq!(found, expected, "{name}");
         }
     }

@@ -19,7 +19,7 @@ fn from_table(table: &CsvTable, options: &OpenOptions) -> Result<LoadedFile, Rea
         return Err(fault.in_file(table.path(), FORMAT));
     }
     let mut warnings = Vec::new();
-    let data = match csv_lattice::find(table)? {
+    let mut data = match csv_lattice::find(table)? {
         Some((data, missing)) => {
             if missing > 0 {
                 warnings
@@ -33,7 +33,21 @@ fn from_table(table: &CsvTable, options: &OpenOptions) -> Result<LoadedFile, Rea
             data
         }
     };
-    if let Some((unit, metres)) = csv_columns::Columns::find(table)?.unit {
+    let columns = csv_columns::Columns::find(table)?;
+    if columns.axisymmetric {
+        let [along, radius] = [0, 1].map(|a| columns.coordinates[a]).map(|c| match c {
+            Some(c) => table.columns()[c].as_str(),
+            None => "",
+        });
+        warnings.push(format!(
+            "the table is axisymmetric by the names of its columns: x is `{along}`, along the axis, \
+             and y is `{radius}`, the distance from it"
+        ));
+        if let Some(attributes) = data.attributes_mut() {
+            attributes.set_axisymmetric();
+        }
+    }
+    if let Some((unit, metres)) = columns.unit {
         warnings.push(format!(
             "the coordinates are in {unit} by their names and stay so; a length unit of {metres} \
              makes them metres"

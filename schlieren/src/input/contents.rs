@@ -5,7 +5,6 @@ use super::plausible::SIDES_M;
 use super::{InputError, with_data};
 use datasets::model::{DataArray, Dataset};
 use datasets::read::OpenOptions;
-use datasets::read::openfoam::BOUNDARY_PATCHES;
 use datasets::resample::{Mesh, Plane};
 use rt_core::math::median_high;
 use serde::Serialize;
@@ -188,16 +187,8 @@ pub fn contents_of_dataset(data: &Dataset) -> Contents {
             }),
         },
     }
-    c.guess = guess(&mut c, is_axisymmetric(data));
+    c.guess = guess(&mut c, data.is_axisymmetric());
     c
-}
-
-/// Whether the data are a case of OpenFOAM between patches of type wedge.
-fn is_axisymmetric(data: &Dataset) -> bool {
-    let text = |d: &Dataset| d.attributes().map_or(Vec::new(), |a| a.text.clone());
-    data.leaves().into_iter().flat_map(text).any(|(name, patches)| {
-        name == BOUNDARY_PATCHES && patches.iter().any(|p| p.split(' ').nth(1) == Some("wedge"))
-    })
 }
 
 fn arrays(data: &Dataset) -> Vec<Array> {
@@ -359,19 +350,6 @@ mod tests {
         let state = [("T", [200.0, 300.0, 900.0]), ("p", [9e4, 1e5, 2e5])];
         let c = image([5; 3], 0.01, &state);
         assert_eq!(options(&c), [("--temperature", "T".into()), ("--pressure", "p".into())]);
-    }
-
-    #[test]
-    fn a_case_between_wedges_is_revolved() {
-        let options_with = |patch: &str| {
-            let mut image = ImageData::new([5, 5, 1], DVec3::ZERO, DVec3::splat(0.01));
-            let values = (0..25).map(|i| 1.0 + 0.02 * f64::from(i)).collect();
-            image.attributes.point.push(DataArray::new("rho", 1, Values::F64(values)));
-            image.attributes.text.push((BOUNDARY_PATCHES.into(), vec![patch.into()]));
-            options(&contents_of_dataset(&Dataset::ImageData(image)))
-        };
-        assert_eq!(options_with("front wedge 16")[1], ("--revolve", String::new()));
-        assert_eq!(options_with("wedge empty 16")[1].0, "--span");
     }
 
     #[test]

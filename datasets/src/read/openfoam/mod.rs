@@ -97,7 +97,10 @@ pub fn read(path: &Path, options: &OpenOptions) -> Result<LoadedFile, ReadError>
     };
     let patches = patches(&mesh);
     let mut grid = match plane::flattened(&mesh) {
-        Some((plane, symmetry)) => {
+        Some((mut plane, symmetry)) => {
+            if symmetry == Symmetry::Axis {
+                plane.attributes.set_axisymmetric();
+            }
             warnings.push(match symmetry {
                 Symmetry::Plane => "the case is two-dimensional (patches of type empty): it is \
                                     read as a plane of polygons"
