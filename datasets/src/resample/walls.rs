@@ -24,6 +24,7 @@ mod sides;
 #[cfg(test)]
 mod tests;
 mod velocity;
+mod velocity_arrays;
 
 use super::mesh::{Mesh, OUTSIDE};
 use crate::model::Dataset;

@@ -77,7 +77,7 @@ fn a_block_with_points_of_its_own_in_a_hole_is_no_body() {
 fn the_velocity_in_cells_or_at_points_tells_a_wall_with_slip() {
     // Down a step of the lower side, and along it.
     let step = |[i, j, _]: [usize; 3]| i > 2 || j > 1;
-    for of_cells in [false, true] {
+    for (of_cells, apart) in [(false, false), (true, false), (false, true), (true, true)] {
         let with = |velocity: &dyn Fn(f64, f64) -> [f64; 3]| {
             let mut data = cells(step, |_| false);
             let Dataset::UnstructuredGrid(grid) = &mut data else { unreachable!() };
@@ -91,9 +91,19 @@ fn the_velocity_in_cells_or_at_points_tells_a_wall_with_slip() {
             } else {
                 (0..grid.points.len() as u32).flat_map(|i| velocity(at(i).x, at(i).y)).collect()
             };
-            let array = DataArray::new("Velocity (m/s)", 3, Values::F64(values));
             let attributes = &mut grid.attributes;
-            if of_cells { &mut attributes.cell } else { &mut attributes.point }.push(array);
+            let arrays = if of_cells { &mut attributes.cell } else { &mut attributes.point };
+            if apart {
+                // As files have them whose arrays are numbers.
+                arrays.extend([(0, "VelocityX"), (1, "VelocityY"), (2, "VelocityZ")].map(
+                    |(axis, name)| {
+                        let of_axis = values.iter().skip(axis).step_by(3).copied().collect();
+                        DataArray::new(name, 1, Values::F64(of_axis))
+                    },
+                ));
+            } else {
+                arrays.push(DataArray::new("Velocity (m/s)", 3, Values::F64(values)));
+            }
             found(&data)
         };
         // Behind the step it turns, slowly, and is nowhere at rest.
@@ -102,7 +112,11 @@ fn the_velocity_in_cells_or_at_points_tells_a_wall_with_slip() {
             false => [5.0, 0.0, 0.0],
         };
         let (by, undecided) = with(&round);
-        assert!(by.len() == 1 && by[0].starts_with("`Velocity (m/s)` following"), "{by:?}");
+        let name = match apart {
+            true => "`VelocityX, VelocityY, VelocityZ` following",
+            false => "`Velocity (m/s)` following",
+        };
+        assert!(by.len() == 1 && by[0].starts_with(name), "{by:?}");
         assert_eq!(undecided, 0.0);
         // Through the step's face, or hardly at all: an inlet, or gas at rest.
         assert_eq!(with(&|_, _| [3.0, 0.2, 0.0]), (vec![], 0.0));

@@ -1,13 +1,10 @@
 //! What the velocity of a flow tells of its border.
 
 use super::Walls;
-use crate::model::{Attributes, DataArray, Dataset};
+use super::velocity_arrays::VelocityArrays;
+use crate::model::{Attributes, Dataset};
 use crate::resample::mesh::Mesh;
 use glam::DVec3;
-
-/// Names of velocities and momenta, in lower case.
-const VELOCITIES: [&str; 8] =
-    ["u", "v", "vel", "velocity", "momentum", "rhou", "umean", "velocities"];
 
 /// A speed below this part of the largest is zero: what a solver writes for a wall without slip.
 const AT_REST: f64 = 1e-9;
@@ -56,24 +53,25 @@ pub(super) struct Flux {
 }
 
 impl Velocity {
-    /// `None` without a vector that has the name of a velocity.
+    /// `None` without arrays that have the name of a velocity or of its components.
     pub(super) fn of(mesh: &Mesh, data: &Dataset) -> Option<Velocity> {
         let leaves = data.leaves();
+        let across = mesh.axis_of_depth();
         let arrays = || leaves.iter().filter_map(|d| d.attributes());
-        let of_points = arrays().find_map(|a| a.point.iter().find(|a| is_velocity(a)));
-        let of_cells = || arrays().find_map(|a| a.cell.iter().find(|a| is_velocity(a)));
+        let of_points = arrays().find_map(|a| VelocityArrays::among(&a.point, across));
+        let of_cells = || arrays().find_map(|a| VelocityArrays::among(&a.cell, across));
         let per_point = of_points.is_some();
-        let name = of_points.or_else(of_cells)?.name.clone();
+        let found = of_points.or_else(of_cells)?;
         let component = |axis: usize| {
-            let of = |a: &Attributes, i: usize| {
-                let array = if per_point { a.point_array(&name) } else { a.cell_array(&name) };
-                array.map_or(f64::NAN, |a| if axis < a.components { a.get(i, axis) } else { 0.0 })
+            let of = |a: &Attributes, i: usize| match per_point {
+                true => found.component(axis, |name| a.point_array(name), i),
+                false => found.component(axis, |name| a.cell_array(name), i),
             };
             if per_point { mesh.gather_points(data, of) } else { mesh.gather_cells(data, of) }
         };
         let [x, y, z] = [component(0), component(1), component(2)];
         let values = (0..x.len()).map(|i| DVec3::new(x[i], y[i], z[i])).collect();
-        let mut velocity = Velocity { name, per_point, values, mean: DVec3::ZERO };
+        let mut velocity = Velocity { name: found.name, per_point, values, mean: DVec3::ZERO };
         velocity.mean = velocity.mean_of(mesh);
         Some(velocity)
     }
@@ -138,34 +136,25 @@ impl Velocity {
 impl Walls {
     /// Points at rest beside gas in motion.
     pub(super) fn add_without_slip(&mut self, mesh: &Mesh, data: &Dataset) {
-        let of_leaf = |d: &&Dataset| {
-            Some(d.attributes()?.point.iter().find(|a| is_velocity(a))?.name.clone())
-        };
-        let Some(name) = data.leaves().iter().find_map(of_leaf) else { return };
-        let speed =
-            |a: &Attributes, i: usize| a.point_array(&name).map_or(f64::NAN, |a| a.magnitude(i));
+        let across = mesh.axis_of_depth();
+        let of_leaf = |d: &&Dataset| VelocityArrays::among(&d.attributes()?.point, across);
+        let Some(found) = data.leaves().iter().find_map(of_leaf) else { return };
+        let speed = |a: &Attributes, i: usize| found.speed(|name| a.point_array(name), i);
         let speeds = mesh.gather_points(data, speed);
         let largest = speeds.iter().copied().filter(|s| s.is_finite()).fold(0.0, f64::max);
-        let mut found = false;
+        let mut has_rest = false;
         for cell in (0..mesh.num_cells()).filter(|c| !mesh.is_hidden(*c)) {
             let ids = mesh.corners(cell).ids;
             if ids.iter().any(|&i| speeds[i as usize] > IN_MOTION * largest) {
                 for &i in &ids {
                     let rest = speeds[i as usize] <= AT_REST * largest;
                     self.of_points[i as usize] |= rest;
-                    found |= rest;
+                    has_rest |= rest;
                 }
             }
         }
-        if found {
-            self.evidence.push(format!("`{name}` being zero, as at a wall without slip"));
+        if has_rest {
+            self.evidence.push(format!("`{}` being zero, as at a wall without slip", found.name));
         }
     }
-}
-
-/// Whether an array is a velocity, by its name and the number of its components.
-fn is_velocity(a: &DataArray) -> bool {
-    let name = a.name.to_lowercase();
-    let end = name.find(['[', '(', ' ']).unwrap_or(name.len());
-    (2..=3).contains(&a.components) && VELOCITIES.contains(&name[..end].trim())
 }
