@@ -4,6 +4,7 @@
 pub(crate) mod amrex;
 pub(crate) mod ensight;
 pub(crate) mod openfoam;
+pub(crate) mod tables;
 pub(crate) mod tecplot;
 
 use datasets::model::*;
@@ -463,6 +464,7 @@ pub(crate) fn all() -> Vec<Sample> {
     list.push(("a.tec", tecplot::TEXT.into()));
     let plt = |version, by_point| tecplot::plt(tecplot::Plt { version, big: by_point, by_point });
     list.extend([("a.plt", plt(112, false)), ("b.plt", plt(107, true)), ("c.plt", plt(75, true))]);
+    list.extend(tables::all());
     list.push(("c.xyz", b"2 2 1\n0 1 0 1\n0 0 1 1\n0 0 0 0\n".to_vec()));
     list
 }
