@@ -11,47 +11,52 @@
 
 use super::ReadError;
 use super::error::{At, Fault, read_bytes};
+use std::borrow::Cow;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 pub(crate) const FORMAT: &str = "CSV";
 
-/// A table with named columns. Cells stay text until a column of numbers is requested.
+/// A table with named columns. It holds the text of the file once; cells are found in it when they
+/// are asked for.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CsvTable {
     path: PathBuf,
     separator: char,
     header: String,
     columns: Vec<String>,
+    text: String,
     rows: Vec<Row>,
 }
 
+/// A row: the number of its line, and where that is in the text.
 #[derive(Debug, Clone, PartialEq)]
 struct Row {
     line: u64,
-    text: String,
-    cells: Vec<String>,
+    text: Range<usize>,
 }
 
 /// Reads a table.
 pub fn read(path: &Path) -> Result<CsvTable, ReadError> {
-    read_from_bytes(path, &read_bytes(path)?)
+    parse(path, read_bytes(path)?).map_err(|f| f.in_file(path, FORMAT))
 }
 
 /// Reads a table from its bytes; `path` is used in messages only.
 pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<CsvTable, ReadError> {
-    parse(path, bytes).map_err(|f| f.in_file(path, FORMAT))
+    parse(path, bytes.to_vec()).map_err(|f| f.in_file(path, FORMAT))
 }
 
-fn parse(path: &Path, bytes: &[u8]) -> Result<CsvTable, Fault> {
-    let text = std::str::from_utf8(bytes).map_err(|e| {
-        let line = bytes[..e.valid_up_to()].iter().filter(|&&b| b == b'\n').count() as u64 + 1;
+fn parse(path: &Path, bytes: Vec<u8>) -> Result<CsvTable, Fault> {
+    let whole = String::from_utf8(bytes).map_err(|e| {
+        let before = &e.as_bytes()[..e.utf8_error().valid_up_to()];
+        let line = before.iter().filter(|&&b| b == b'\n').count() as u64 + 1;
         Fault::new(
             At::Line(line),
             "bytes that are not text (UTF-8)",
             "save the table as UTF-8 text",
         )
     })?;
-    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let text = whole.strip_prefix('\u{feff}').unwrap_or(&whole);
     let numbered = || text.lines().enumerate().map(|(i, l)| (i as u64 + 1, l));
     let is_section = |l: &str| l.trim().starts_with('[') && l.trim().ends_with(']');
     let data = numbered().find(|(_, l)| l.trim().eq_ignore_ascii_case("[data]"));
@@ -109,16 +114,20 @@ fn parse(path: &Path, bytes: &[u8]) -> Result<CsvTable, Fault> {
 
     // The rows.
     let mut rows = Vec::new();
-    for (line, text) in lines {
-        let row = cells(text, separator).map_err(|what| unclosed(line, what))?;
-        if row.len() != columns.len() {
-            let what = format!("{} cells, but there are {} columns", row.len(), columns.len());
+    for (line, row) in lines {
+        let mut count = 0;
+        each_cell(row, separator, |_| count += 1).map_err(|what| unclosed(line, what))?;
+        if count != columns.len() {
+            let what = format!("{count} cells, but there are {} columns", columns.len());
             let cure = format!("give every row one cell per column, separated by {separator:?}");
             return Err(Fault::new(At::Line(line), what, cure));
         }
-        rows.push(Row { line, text: text.to_string(), cells: row });
+        // A line is a part of the text.
+        let start = row.as_ptr() as usize - whole.as_ptr() as usize;
+        rows.push(Row { line, text: start..start + row.len() });
     }
-    Ok(CsvTable { path: path.to_path_buf(), separator, header: header.to_string(), columns, rows })
+    let header = header.to_string();
+    Ok(CsvTable { path: path.to_path_buf(), separator, header, columns, rows, text: whole })
 }
 
 /// Characters that begin a comment.
@@ -158,56 +167,70 @@ fn unclosed(line: u64, cell: String) -> Fault {
     Fault::new(At::Line(line), what, "close the quote on the same line; double the quotes inside")
 }
 
-/// Splits a line into cells without surrounding space and quotes; `Err` holds the cell whose quotes
-/// are invalid.
+/// The cells of a line without surrounding space and quotes; `Err` holds the cell whose quotes are
+/// invalid.
 fn cells(line: &str, separator: char) -> Result<Vec<String>, String> {
-    if separator == ' ' {
-        return blank_cells(line);
-    }
     let mut out = Vec::new();
+    each_cell(line, separator, |cell| out.push(cell.into_owned()))?;
+    Ok(out)
+}
+
+/// Calls `f` with each cell of a line; see [`cells`].
+fn each_cell<'a>(
+    line: &'a str,
+    separator: char,
+    mut f: impl FnMut(Cow<'a, str>),
+) -> Result<(), String> {
+    if separator == ' ' {
+        return each_blank_cell(line, f);
+    }
     let mut rest = line;
     loop {
         // White space that is not itself the separator (a tab may be).
         let start = rest.trim_start_matches(|c: char| c.is_whitespace() && c != separator);
         if let Some(quoted) = start.strip_prefix('"') {
-            let mut cell = String::new();
-            let mut chars = quoted.char_indices().peekable();
-            let after = loop {
-                match chars.next() {
-                    Some((_, '"')) if chars.peek().is_some_and(|c| c.1 == '"') => {
-                        chars.next();
-                        cell.push('"');
-                    }
-                    Some((at, '"')) => break &quoted[at + 1..],
-                    Some((_, c)) => cell.push(c),
-                    None => return Err(cell),
-                }
-            };
+            let (cell, after) = closed(quoted).ok_or_else(|| quoted.replace("\"\"", "\""))?;
             let after = after.trim_start_matches(|c: char| c.is_whitespace() && c != separator);
-            out.push(cell);
             match after.strip_prefix(separator) {
                 Some(next) => rest = next,
-                None if after.is_empty() => return Ok(out),
-                None => return Err(out.pop().unwrap_or_default()),
+                None if after.is_empty() => {
+                    f(cell);
+                    return Ok(());
+                }
+                None => return Err(cell.into_owned()),
             }
+            f(cell);
         } else {
             match rest.split_once(separator) {
                 Some((cell, next)) => {
-                    out.push(cell.trim().to_string());
+                    f(cell.trim().into());
                     rest = next;
                 }
                 None => {
-                    out.push(rest.trim().to_string());
-                    return Ok(out);
+                    f(rest.trim().into());
+                    return Ok(());
                 }
             }
         }
     }
 }
 
-/// As [`cells`], where blanks separate.
-fn blank_cells(line: &str) -> Result<Vec<String>, String> {
-    let mut out = Vec::new();
+/// The cell up to the quote that closes it, and what is after that; `None` without one.
+fn closed(quoted: &str) -> Option<(Cow<'_, str>, &str)> {
+    let mut from = 0;
+    loop {
+        let end = from + quoted[from..].find('"')?;
+        if !quoted[end + 1..].starts_with('"') {
+            let cell = &quoted[..end];
+            let cell = if from == 0 { cell.into() } else { cell.replace("\"\"", "\"").into() };
+            return Some((cell, &quoted[end + 1..]));
+        }
+        from = end + 2;
+    }
+}
+
+/// As [`each_cell`], where blanks separate.
+fn each_blank_cell<'a>(line: &'a str, mut f: impl FnMut(Cow<'a, str>)) -> Result<(), String> {
     let mut rest = line.trim();
     while !rest.is_empty() {
         let (cell, next) = match rest.strip_prefix('"') {
@@ -217,10 +240,10 @@ fn blank_cells(line: &str) -> Result<Vec<String>, String> {
         if !next.is_empty() && !next.starts_with(char::is_whitespace) {
             return Err(cell.to_string());
         }
-        out.push(cell.to_string());
+        f(cell.into());
         rest = next.trim_start();
     }
-    Ok(out)
+    Ok(())
 }
 
 impl CsvTable {
@@ -250,15 +273,29 @@ impl CsvTable {
     }
     /// Row `row` as written in the file; panics when out of range.
     pub fn row_text(&self, row: usize) -> &str {
-        &self.rows[row].text
+        &self.text[self.rows[row].text.clone()]
     }
     /// Line number of row `row` in the file, from 1; panics when out of range.
     pub fn line(&self, row: usize) -> u64 {
         self.rows[row].line
     }
-    /// A cell as text; panics when out of range.
-    pub fn cell(&self, row: usize, column: usize) -> &str {
-        &self.rows[row].cells[column]
+    /// A cell as text; panics when out of range. It is found by reading its row.
+    pub fn cell(&self, row: usize, column: usize) -> Cow<'_, str> {
+        let mut found = None;
+        let mut at = 0;
+        self.each_cell(row, |cell| {
+            if at == column {
+                found = Some(cell);
+            }
+            at += 1;
+        });
+        found.expect("the column exists")
+    }
+
+    /// Calls `f` with each cell of a row.
+    pub(crate) fn each_cell<'a>(&'a self, row: usize, f: impl FnMut(Cow<'a, str>)) {
+        // Rows whose quotes are not closed were refused when the table was read.
+        let _ = each_cell(self.row_text(row), self.separator, f);
     }
 
     /// Index of the column with this name. Case matters only if it distinguishes columns.
@@ -291,34 +328,66 @@ impl CsvTable {
     /// ```
     pub fn numbers(&self, name: &str) -> Result<Vec<f64>, ReadError> {
         let column = self.column_index(name)?;
-        (0..self.len()).map(|row| self.number(row, column)).collect()
+        let number = |row| {
+            let cell = self.cell(row, column);
+            number(&cell).ok_or_else(|| self.not_a_number(row, column, &cell))
+        };
+        (0..self.len()).map(number).collect()
     }
 
-    /// The number in a cell; panics when out of range.
-    pub(crate) fn number(&self, row: usize, column: usize) -> Result<f64, ReadError> {
-        let Row { line, cells, .. } = &self.rows[row];
-        let cell = &cells[column];
-        cell.parse::<f64>().ok().filter(|x| x.is_finite()).ok_or_else(|| {
-            let cure = if cell.is_empty() {
-                "fill it in, or remove the row"
-            } else if cell.contains(',') {
-                "write the number with a decimal point"
-            } else {
-                "write a number, without its unit"
-            };
-            self.fault(*line, &self.columns[column], cell, "is not a number", cure)
-        })
+    /// The numbers of several columns, by one reading of each row. Cells for which `is_missing` is
+    /// true are NaN.
+    pub(crate) fn columns_of_numbers(
+        &self,
+        wanted: &[usize],
+        is_missing: impl Fn(&str) -> bool,
+    ) -> Result<Vec<Vec<f64>>, ReadError> {
+        let mut out = vec![Vec::with_capacity(self.len()); wanted.len()];
+        let mut of_column = vec![None; self.columns.len()];
+        wanted.iter().enumerate().for_each(|(i, &column)| of_column[column] = Some(i));
+        for row in 0..self.len() {
+            let (mut column, mut fault) = (0, None);
+            self.each_cell(row, |cell| {
+                if let Some(i) = of_column[column] {
+                    let value = match number(&cell) {
+                        _ if is_missing(&cell) => f64::NAN,
+                        Some(value) => value,
+                        None => {
+                            fault.get_or_insert((column, cell));
+                            f64::NAN
+                        }
+                    };
+                    out[i].push(value);
+                }
+                column += 1;
+            });
+            if let Some((column, cell)) = fault {
+                return Err(self.not_a_number(row, column, &cell));
+            }
+        }
+        Ok(out)
+    }
+
+    fn not_a_number(&self, row: usize, column: usize, cell: &str) -> ReadError {
+        let cure = if cell.is_empty() {
+            "fill it in, or remove the row"
+        } else if cell.contains(',') {
+            "write the number with a decimal point"
+        } else {
+            "write a number, without its unit"
+        };
+        self.fault(self.line(row), &self.columns[column], cell, "is not a number", cure)
     }
 
     /// Makes an error about the value in a cell, for checks by callers.
     pub fn cell_error(&self, row: usize, column: &str, what: &str, cure: &str) -> ReadError {
         let index = self.columns.iter().position(|c| c.eq_ignore_ascii_case(column));
         let (line, cell) = match (self.rows.get(row), index) {
-            (Some(r), Some(i)) => (r.line, r.cells[i].as_str()),
-            (Some(r), None) => (r.line, ""),
-            (None, _) => (0, ""),
+            (Some(r), Some(i)) => (r.line, self.cell(row, i)),
+            (Some(r), None) => (r.line, "".into()),
+            (None, _) => (0, "".into()),
         };
-        self.fault(line, column, cell, what, cure)
+        self.fault(line, column, &cell, what, cure)
     }
 
     fn fault(&self, line: u64, column: &str, cell: &str, what: &str, cure: &str) -> ReadError {
@@ -326,6 +395,11 @@ impl CsvTable {
         let what = format!("column `{column}`: `{shown}` {what}");
         Fault::new(At::Line(line), what, cure).in_file(&self.path, FORMAT)
     }
+}
+
+/// The finite number that a cell is.
+fn number(cell: &str) -> Option<f64> {
+    cell.parse::<f64>().ok().filter(|x| x.is_finite())
 }
 
 #[cfg(test)]
@@ -348,7 +422,8 @@ mod tests {
             (t.columns(), t.separator(), t.len()),
             (&["a;1".into(), "B".into(), "c".into()][..], ';', 2)
         );
-        assert_eq!((t.cell(0, 0), t.cell(1, 0), t.line(0), t.line(1)), ("say \"hi\"", "", 4, 6));
+        assert_eq!((&*t.cell(0, 0), &*t.cell(1, 0)), ("say \"hi\"", ""));
+        assert_eq!((t.line(0), t.line(1)), (4, 6));
         assert_eq!(t.numbers("b").unwrap(), [2.0, 4.0]);
         assert_eq!(t.numbers("c").unwrap(), [3.0, 5.0]);
         assert_eq!(table("x\n1\n").unwrap().numbers("x").unwrap(), [1.0]);
@@ -468,7 +543,7 @@ mod tests {
             let row: Vec<String> = cells.iter().map(|c| format!("\"{}\"", c.replace('"', "\"\""))).collect();
             let t = table(&format!("{}\n{}\n", names.join(","), row.join(","))).unwrap();
             for (i, c) in cells.iter().enumerate() {
-                prop_assert_eq!(t.cell(0, i), c.as_str());
+                prop_assert_eq!(&*t.cell(0, i), c.as_str());
             }
         }
     }

@@ -5,6 +5,7 @@ use super::ReadError;
 use super::csv::{CsvTable, FORMAT};
 use super::error::{At, Fault};
 use crate::model::{DataArray, Values};
+use std::path::PathBuf;
 
 /// Names of the x column apart from case, brackets with units, and `-`, ` ` for `_`. Those of y and
 /// z have the other letters and numbers. `Points:0` is ParaView's, `x-coordinate` Fluent's,
@@ -115,31 +116,67 @@ impl Columns {
         }
         let units = coordinates.iter().flatten().filter_map(|c| places[*c]?.1);
         let unit = units.into_iter().next();
-        // Columns of text, as names of regions, are left out, as are columns without any value.
-        let is_number = |c: &usize| {
-            let mut cells = (0..table.len()).map(|r| table.cell(r, *c));
-            let first = cells.find(|cell| !is_missing(cell));
-            first.is_some_and(|cell| cell.parse::<f64>().is_ok())
-        };
-        let values = (0..table.columns().len()).filter(|i| !coordinates.contains(&Some(*i)));
-        let values = values.filter(is_number).collect();
+        let others = (0..table.columns().len()).filter(|i| !coordinates.contains(&Some(*i)));
+        let values = with_numbers(table, others.collect());
         let unit = unit.filter(|(_, metres)| *metres != 1.0);
         Ok(Columns { coordinates, values, axisymmetric: radial.is_some(), unit })
     }
 
-    /// The coordinates of each row along an axis: 0 where the table has no column for it, NaN where
-    /// the cell is missing.
-    pub(crate) fn along(&self, table: &CsvTable, axis: usize) -> Result<Vec<f64>, ReadError> {
-        match self.coordinates[axis] {
-            Some(column) => numbers(table, column),
-            None => Ok(vec![0.0; table.len()]),
-        }
+    /// The numbers of all rows.
+    ///
+    /// # Errors
+    /// If a cell is neither a number nor missing.
+    pub(crate) fn numbers(&self, table: &CsvTable) -> Result<Numbers, ReadError> {
+        let places = self.coordinates.iter().flatten();
+        let wanted: Vec<usize> = places.chain(&self.values).copied().collect();
+        let mut columns = table.columns_of_numbers(&wanted, is_missing)?.into_iter();
+        let mut place = |column: Option<usize>| match column {
+            Some(_) => columns.next().unwrap_or_default(),
+            None => vec![0.0; table.len()],
+        };
+        let coordinates = self.coordinates.map(&mut place);
+        let names = self.values.iter().map(|c| table.columns()[*c].clone());
+        Ok(Numbers { path: table.path().into(), coordinates, values: names.zip(columns).collect() })
     }
+}
 
-    /// The values of each row by the names of the columns. Missing ones are NaN.
-    pub(crate) fn values(&self, table: &CsvTable) -> Result<Vec<(String, Vec<f64>)>, ReadError> {
-        self.values.iter().map(|c| Ok((table.columns()[*c].clone(), numbers(table, *c)?))).collect()
+/// The numbers of a table of points, without its text.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Numbers {
+    /// The file, for messages.
+    pub(crate) path: PathBuf,
+    /// Coordinates of each row: 0 along axes for which the table has no column, NaN where a cell is
+    /// missing.
+    pub(crate) coordinates: [Vec<f64>; 3],
+    /// Values of each row by the names of the columns. Missing ones are NaN.
+    pub(crate) values: Vec<(String, Vec<f64>)>,
+}
+
+impl Numbers {
+    /// Number of rows.
+    pub(crate) fn len(&self) -> usize {
+        self.coordinates[0].len()
     }
+}
+
+/// Those of these columns that have numbers: columns of text, as names of regions, are left out, as
+/// are columns without any value.
+fn with_numbers(table: &CsvTable, columns: Vec<usize>) -> Vec<usize> {
+    let mut is_number: Vec<Option<bool>> = vec![Some(false); table.columns().len()];
+    columns.iter().for_each(|c| is_number[*c] = None);
+    for row in 0..table.len() {
+        if !is_number.contains(&None) {
+            break;
+        }
+        let mut column = 0;
+        table.each_cell(row, |cell| {
+            if is_number[column].is_none() && !is_missing(&cell) {
+                is_number[column] = Some(cell.parse::<f64>().is_ok());
+            }
+            column += 1;
+        });
+    }
+    columns.into_iter().filter(|c| is_number[*c] == Some(true)).collect()
 }
 
 /// An array of points.
@@ -201,15 +238,6 @@ fn of_axis(name: &str, axis: usize) -> String {
 
 fn is_missing(cell: &str) -> bool {
     MISSING.iter().any(|m| m.eq_ignore_ascii_case(cell))
-}
-
-/// The numbers of a column, NaN for missing ones.
-fn numbers(table: &CsvTable, column: usize) -> Result<Vec<f64>, ReadError> {
-    let number = |row| match table.cell(row, column) {
-        cell if is_missing(cell) => Ok(f64::NAN),
-        _ => table.number(row, column),
-    };
-    (0..table.len()).map(number).collect()
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 
 use super::ReadError;
 use super::csv::{CsvTable, FORMAT};
-use super::csv_columns::{Columns, array};
+use super::csv_columns::{Columns, Numbers, array};
 use super::error::{At, Fault};
 use crate::model::{Attributes, Dataset, RectilinearGrid};
 
@@ -20,75 +20,80 @@ use crate::model::{Attributes, Dataset, RectilinearGrid};
 /// # Ok::<(), datasets::read::ReadError>(())
 /// ```
 pub fn dataset(table: &CsvTable) -> Result<Dataset, ReadError> {
-    let columns = Columns::find(table)?;
-    match lattice(table, &columns)? {
+    let numbers = Columns::find(table)?.numbers(table)?;
+    match lattice(&numbers) {
         Ok((data, _)) => Ok(data),
-        Err(NotLattice(what, cure)) => {
+        Err(NotLattice { what, rows, cure }) => {
+            let lines = rows.map(|r| {
+                let [first, second] = r.map(|row| table.line(row));
+                format!("lines {first} and {second} ")
+            });
+            let what = lines.unwrap_or_default() + &what;
             let at = At::Field("the table".into());
             Err(Fault::new(at, what, cure).in_file(table.path(), FORMAT))
         }
     }
 }
 
-/// The lattice of the table, if it is one, and how many values are missing.
-pub(crate) fn find(table: &CsvTable) -> Result<Option<(Dataset, usize)>, ReadError> {
-    Ok(lattice(table, &Columns::find(table)?)?.ok())
+/// The lattice of the rows, if they are one, and how many values are missing.
+pub(crate) fn find(numbers: &Numbers) -> Option<(Dataset, usize)> {
+    lattice(numbers).ok()
 }
 
-/// Why a table is not a lattice, and the cure.
-struct NotLattice(String, &'static str);
+/// Why a table is not a lattice, two rows that are the reason, and the cure.
+struct NotLattice {
+    what: String,
+    rows: Option<[usize; 2]>,
+    cure: &'static str,
+}
 
-fn lattice(
-    table: &CsvTable,
-    columns: &Columns,
-) -> Result<Result<(Dataset, usize), NotLattice>, ReadError> {
-    let mut of_rows: Vec<Vec<f64>> = Vec::new();
-    let mut coordinates: [Vec<f64>; 3] = Default::default();
-    for (axis, distinct) in coordinates.iter_mut().enumerate() {
-        let values = columns.along(table, axis)?;
-        distinct.clone_from(&values);
+fn lattice(numbers: &Numbers) -> Result<(Dataset, usize), NotLattice> {
+    let rows = numbers.len();
+    let coordinates = numbers.coordinates.each_ref().map(|of_rows| {
+        let mut distinct = of_rows.clone();
         distinct.sort_by(f64::total_cmp);
         // −0 and 0 are the same coordinate.
         distinct.dedup_by(|a, b| a == b);
-        of_rows.push(values);
-    }
+        distinct.shrink_to_fit();
+        distinct
+    });
     let dims = [0, 1, 2].map(|a| coordinates[a].len());
     let cells = dims.iter().try_fold(1usize, |n, &d| n.checked_mul(d));
     let has_gap = coordinates.iter().flatten().any(|x| x.is_nan());
-    if cells != Some(table.len()) || table.is_empty() || has_gap {
+    if cells != Some(rows) || rows == 0 || has_gap {
         let what = format!(
-            "{} rows, but {} x {} x {} different coordinates: the points are not a lattice",
-            table.len(),
-            dims[0],
-            dims[1],
-            dims[2]
+            "{rows} rows, but {} x {} x {} different coordinates: the points are not a lattice",
+            dims[0], dims[1], dims[2]
         );
         let cure = "export the mesh itself (.vtu, .vts), or points on a lattice";
-        return Ok(Err(NotLattice(what, cure)));
+        return Err(NotLattice { what, rows: None, cure });
     }
 
     // The row of each lattice point.
-    let mut row_of = vec![usize::MAX; table.len()];
-    for row in 0..table.len() {
-        let at = [0, 1, 2].map(|a| coordinates[a].partition_point(|x| *x < of_rows[a][row]));
+    let mut row_of = vec![usize::MAX; rows];
+    for row in 0..rows {
+        let place = |a: usize| numbers.coordinates[a][row];
+        let at = [0, 1, 2].map(|a| coordinates[a].partition_point(|x| *x < place(a)));
         let slot = &mut row_of[at[0] + dims[0] * (at[1] + dims[1] * at[2])];
         if *slot != usize::MAX {
-            let (first, second) = (table.line(*slot), table.line(row));
-            let what = format!("lines {first} and {second} have the same coordinates");
-            return Ok(Err(NotLattice(what, "remove one of them")));
+            return Err(NotLattice {
+                what: "have the same coordinates".into(),
+                rows: Some([*slot, row]),
+                cure: "remove one of them",
+            });
         }
         *slot = row;
     }
 
     let mut attributes = Attributes::default();
     let mut missing = 0;
-    for (name, values) in columns.values(table)? {
+    for (name, values) in &numbers.values {
         missing += values.iter().filter(|v| v.is_nan()).count();
-        attributes.point.push(array(&name, row_of.iter().map(|&r| values[r]).collect()));
+        attributes.point.push(array(name, row_of.iter().map(|&r| values[r]).collect()));
     }
     let extent = [0, dims[0] as i32 - 1, 0, dims[1] as i32 - 1, 0, dims[2] as i32 - 1];
     let grid = RectilinearGrid { extent, coordinates, attributes };
-    Ok(Ok((Dataset::RectilinearGrid(grid), missing)))
+    Ok((Dataset::RectilinearGrid(grid), missing))
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use super::ReadError;
 use super::csv::{CsvTable, FORMAT};
-use super::csv_columns::{Columns, array};
+use super::csv_columns::{Columns, Numbers, array};
 use super::error::{At, Fault};
 use crate::delaunay::gaps::{self, Gaps};
 use crate::delaunay::snap::Snapped;
@@ -62,23 +62,30 @@ pub struct PointsReport {
 /// # Ok::<(), datasets::read::ReadError>(())
 /// ```
 pub fn dataset(table: &CsvTable, gap: f64) -> Result<(Dataset, PointsReport), ReadError> {
-    let columns = Columns::find(table)?;
+    of_numbers(Columns::find(table)?.numbers(table)?, gap)
+}
+
+/// As [`dataset`], of the numbers of a table. Each copy of the points ends where the next is made:
+/// tables of millions of rows are common.
+pub(crate) fn of_numbers(numbers: Numbers, gap: f64) -> Result<(Dataset, PointsReport), ReadError> {
+    let Numbers { path, coordinates, mut values } = numbers;
     let mut report = PointsReport::default();
-    let axes: [Vec<f64>; 3] =
-        [columns.along(table, 0)?, columns.along(table, 1)?, columns.along(table, 2)?];
-    let mut values = columns.values(table)?;
 
     // Rows with a place.
-    let at = |row: usize| [axes[0][row], axes[1][row], axes[2][row]];
-    let rows: Vec<usize> =
-        (0..table.len()).filter(|r| at(*r).iter().all(|x| x.is_finite())).collect();
-    report.rows_without_place = table.len() - rows.len();
+    let at = |row: usize| [0, 1, 2].map(|a: usize| coordinates[a][row]);
+    let has_place = |row: &usize| at(*row).iter().all(|x| x.is_finite());
+    let count = coordinates[0].len();
+    let rows: Vec<usize> = (0..count).filter(has_place).collect();
+    report.rows_without_place = count - rows.len();
     let mut points: Vec<[f64; 3]> = rows.iter().map(|r| at(*r)).collect();
-    values.iter_mut().for_each(|(_, v)| *v = rows.iter().map(|r| v[*r]).collect());
+    if rows.len() < count {
+        values.iter_mut().for_each(|(_, v)| *v = rows.iter().map(|r| v[*r]).collect());
+    }
+    drop((coordinates, rows));
 
     // The axis that the points do not extend along comes last, for a triangulation in the plane.
     let fault = |what: String, cure: &str| {
-        Fault::new(At::Field("the table".into()), what, cure).in_file(table.path(), FORMAT)
+        Fault::new(At::Field("the table".into()), what, cure).in_file(&path, FORMAT)
     };
     if u32::try_from(points.len()).is_err() {
         return Err(fault(format!("{} points are too many", points.len()), "thin them out"));
@@ -92,7 +99,8 @@ pub fn dataset(table: &CsvTable, gap: f64) -> Result<(Dataset, PointsReport), Re
     }
     let turned: Vec<[f64; 3]> = points.iter().map(|p| turned.map(|a| p[a])).collect();
     let snapped = Snapped::new(&turned);
-    let joined = join(&snapped, &points, &values, &mut report);
+    drop(turned);
+    let joined = join(&snapped, points, values, &mut report);
 
     // The cells.
     let cells = match flat {
@@ -151,8 +159,8 @@ struct Joined {
 /// Joins the rows of each place: the first of their coordinates, and the mean of their values.
 fn join(
     snapped: &Snapped,
-    points: &[[f64; 3]],
-    values: &[(String, Vec<f64>)],
+    points: Vec<[f64; 3]>,
+    values: Vec<(String, Vec<f64>)>,
     report: &mut PointsReport,
 ) -> Joined {
     let count = snapped.len();
@@ -161,7 +169,7 @@ fn join(
     let less = |p: DVec3, q: DVec3| {
         p.to_array().partial_cmp(&q.to_array()).is_some_and(|order| order.is_lt())
     };
-    for (place, p) in snapped.place_of.iter().zip(points) {
+    for (place, p) in snapped.place_of.iter().zip(&points) {
         let p = DVec3::from(*p);
         // Within a rounding of the integers, rows may differ: their order shall not matter.
         if less(p, places[*place as usize]) {
@@ -173,7 +181,7 @@ fn join(
     for (name, of_rows) in values {
         let mut sums = vec![(0.0, 0u32); count];
         let mut first = vec![f64::NAN; count];
-        for (row, (place, value)) in snapped.place_of.iter().zip(of_rows).enumerate() {
+        for (row, (place, value)) in snapped.place_of.iter().zip(&of_rows).enumerate() {
             let place = *place as usize;
             if value.is_nan() {
                 report.missing_values += 1;
@@ -184,7 +192,7 @@ fn join(
             sums[place] = (sums[place].0 + value, sums[place].1 + 1);
         }
         // A single value stays as it is; without any, the mean is NaN.
-        arrays.push(array(name, sums.iter().map(|(sum, n)| sum / f64::from(*n)).collect()));
+        arrays.push(array(&name, sums.iter().map(|(sum, n)| sum / f64::from(*n)).collect()));
     }
     report.joined_with_other_values = differs.iter().filter(|d| **d).count();
     Joined { places, arrays }
