@@ -18,6 +18,8 @@ pub(super) struct Extruded {
     pub(super) source: Vec<u32>,
     /// Cells that are no polygons or refer to points that do not exist.
     pub(super) left_out: usize,
+    /// The direction across the plane, of length 1.
+    pub(super) normal: DVec3,
 }
 
 /// The polygons of a surface as cells of a grid, with their numbers among the surface's cells.
@@ -136,7 +138,7 @@ pub(super) fn extruded(d: &UnstructuredGrid, span: f64) -> Option<Extruded> {
         }
         grid.faces_of_cell.push(faces..grid.polyhedron_faces.len());
     }
-    Some(Extruded { grid, source, left_out })
+    Some(Extruded { grid, source, left_out, normal })
 }
 
 #[cfg(test)]

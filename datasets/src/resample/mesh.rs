@@ -2,6 +2,7 @@
 //! Lattices keep their implicit cells.
 
 mod faces;
+mod flat;
 mod layers;
 mod places;
 mod topology;
@@ -9,7 +10,7 @@ mod topology;
 use super::{ResampleError, extrude};
 use crate::model::{Attributes, CellType, Dataset, Points, UnstructuredGrid, extent_dims};
 pub(super) use faces::{HIDDEN, NO_FACE, Neighbours, OUTSIDE, WALL};
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use layers::{flat_source, hidden_cells_of_lattice, plane_normal};
 use rayon::prelude::*;
 use rt_core::math::median_high;
@@ -33,6 +34,7 @@ pub struct Mesh {
     left_out: usize,
     higher_order: usize,
     computed: Computed,
+    turn: Option<DMat3>,
 }
 
 /// A cell whose box is longer than this part of the mesh's is the only one along that axis.
@@ -42,11 +44,24 @@ const WHOLE: f64 = 0.75;
 struct Part {
     /// Index into [`Dataset::leaves`].
     leaf: usize,
-    /// The axis along which a plane lattice was extruded; any for prisms over polygons.
-    extruded: Option<usize>,
+    /// How a plane got depth.
+    depth: Option<PartDepth>,
+    /// The direction of the depth, of length 1.
+    normal: DVec3,
     points: Range<usize>,
     cells: Range<usize>,
     kind: PartKind,
+}
+
+/// Where the points of a plane with depth come from.
+#[derive(Debug, Clone)]
+enum PartDepth {
+    /// From a lattice, with a second layer along this axis.
+    Layer(usize),
+    /// From polygons, below the plane and then again above it.
+    Copies,
+    /// From one layer of cells. Flag per point: whether it is above the plane.
+    Sides(Vec<bool>),
 }
 
 #[derive(Debug, Clone)]
@@ -99,7 +114,9 @@ impl Mesh {
         Self::build(data, None)
     }
 
-    /// As [`Self::new`], with depth for data in a plane. Three-dimensional data is rejected.
+    /// As [`Self::new`], with depth for data in a plane, and for one layer of cells instead of its
+    /// thickness. Other three-dimensional data is rejected. A plane that slants to the axes is
+    /// turned onto two of them ([`Self::turn`]).
     pub fn with_plane(data: &Dataset, plane: Plane) -> Result<Mesh, ResampleError> {
         Self::build(data, Some(plane))
     }
@@ -120,12 +137,19 @@ impl Mesh {
             left_out: 0,
             higher_order: 0,
             computed: Computed::default(),
+            turn: None,
         };
         let mut flat = 0;
         for (number, leaf) in data.leaves().into_iter().enumerate() {
             let before = mesh.parts.len();
             flat += usize::from(mesh.add(leaf, plane)?);
             mesh.parts[before..].iter_mut().for_each(|p| p.leaf = number);
+            let Some(Plane::Extrude { span }) = plane else { continue };
+            for part in before..mesh.parts.len() {
+                if mesh.parts[part].depth.is_none() && mesh.stretch_layer(part, span) {
+                    flat += 1;
+                }
+            }
         }
         if mesh.cells == 0 {
             let (found, cure) = if flat > 0 {
@@ -148,6 +172,7 @@ impl Mesh {
                 cure: "leave it out: the data has depth of its own",
             });
         }
+        mesh.turn_to_axes();
         Ok(mesh)
     }
 
@@ -199,6 +224,7 @@ impl Mesh {
         let first = self.points.len();
         let mut hidden = hidden_cells_of_lattice(dims, attributes);
         let mut dims = dims;
+        let mut normal = DVec3::Z;
         if is_flat {
             let Some(Plane::Extrude { span }) = plane else {
                 self.left_out += count;
@@ -208,7 +234,7 @@ impl Mesh {
             // either side.
             let axis = flat_axis.unwrap_or(2);
             let flat: Vec<DVec3> = (0..count).map(at).collect();
-            let normal = plane_normal(&flat, dims, axis);
+            normal = plane_normal(&flat, dims, axis);
             dims[axis] = 2;
             let total = 2 * count;
             self.points.extend((0..total).map(|i| {
@@ -226,7 +252,8 @@ impl Mesh {
         let cells: usize = dims.iter().map(|&d| d - 1).product();
         self.push(first, cells, PartKind::Lattice(dims), &mut hidden)?;
         if is_flat && let Some(part) = self.parts.last_mut() {
-            part.extruded = flat_axis;
+            part.depth = flat_axis.map(PartDepth::Layer);
+            part.normal = normal;
         }
         Ok(is_flat)
     }
@@ -315,7 +342,7 @@ impl Mesh {
             })
             .collect();
         let Some(part) = self.parts.last_mut() else { return Ok(true) };
-        part.extruded = Some(2);
+        (part.depth, part.normal) = (Some(PartDepth::Copies), prisms.normal);
         if let PartKind::Cells(e) = &mut part.kind {
             e.source = prisms.source.iter().map(|c| c + first_cell).collect();
         }
@@ -348,7 +375,8 @@ impl Mesh {
         }
         self.parts.push(Part {
             leaf: 0,
-            extruded: None,
+            depth: None,
+            normal: DVec3::Z,
             points: first..self.points.len(),
             cells: range,
             kind,
@@ -486,9 +514,11 @@ impl Mesh {
         let mut out = Vec::with_capacity(self.points.len());
         self.each_part(data, |part, attributes| {
             out.extend((0..part.points.len()).map(|i| {
-                let source = match (&part.kind, part.extruded) {
-                    (PartKind::Lattice(n), Some(axis)) => flat_source(i, *n, axis).0,
-                    (PartKind::Cells(_), Some(_)) => i % (part.points.len() / 2),
+                let source = match (&part.kind, &part.depth) {
+                    (PartKind::Lattice(n), Some(PartDepth::Layer(axis))) => {
+                        flat_source(i, *n, *axis).0
+                    }
+                    (_, Some(PartDepth::Copies)) => i % (part.points.len() / 2),
                     _ => i,
                 };
                 value(attributes, source)

@@ -96,6 +96,9 @@ fn text(info: &Info<'_>) -> String {
         let unit = c.guess.as_ref().map_or(1.0, |g| g.length_unit_m);
         let unit = if unit == 1.0 { "m, if its unit is the metre" } else { "in its own unit" };
         lines.push(match c.planar {
+            // Without the side across the plane.
+            true if x == 0.0 => format!("  size {y:.4} x {z:.4}, two-dimensional, {unit}"),
+            true if y == 0.0 => format!("  size {x:.4} x {z:.4}, two-dimensional, {unit}"),
             true => format!("  size {x:.4} x {y:.4}, two-dimensional, {unit}"),
             false => format!("  size {x:.4} x {y:.4} x {z:.4} {unit}"),
         });

@@ -20,9 +20,10 @@ pub struct Contents {
     pub points: u64,
     /// Cells, summed over blocks.
     pub cells: u64,
-    /// Extent along the axes, in the unit of the file. `None` when there are no cells to trace.
+    /// Extent along the axes, in the unit of the file; of a plane that slants to them, as it is
+    /// turned onto two of them. `None` when there are no cells to trace.
     pub size: Option<[f64; 3]>,
-    /// Whether all cells lie in a plane of constant z.
+    /// Whether all cells lie in a plane.
     pub planar: bool,
     /// The arrays of points and cells.
     pub arrays: Vec<Array>,
@@ -178,8 +179,10 @@ pub fn contents_of_dataset(data: &Dataset) -> Contents {
         }
         solid => match Mesh::with_plane(data, Plane::Extrude { span: 1.0 }) {
             Ok(plane) if plane.num_cells() > 0 => {
-                let [x, y, _] = size_of(plane);
-                (c.size, c.planar) = (Some([x, y, 0.0]), true);
+                let across = plane.axis_of_depth();
+                let mut size = size_of(plane);
+                across.into_iter().for_each(|axis| size[axis] = 0.0);
+                (c.size, c.planar) = (Some(size), true);
             }
             _ => c.notes.push(match solid {
                 Err(e) => e.to_string(),
@@ -324,7 +327,7 @@ fn guess(c: &mut Contents, axisymmetric: bool) -> Option<Guess> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use datasets::model::{ImageData, Values};
+    use datasets::model::{Attributes, ImageData, Points, StructuredGrid, Values};
     use glam::DVec3;
 
     fn image(dims: [u32; 3], spacing: f64, arrays: &[(&str, [f64; 3])]) -> Contents {
@@ -350,6 +353,24 @@ mod tests {
         let state = [("T", [200.0, 300.0, 900.0]), ("p", [9e4, 1e5, 2e5])];
         let c = image([5; 3], 0.01, &state);
         assert_eq!(options(&c), [("--temperature", "T".into()), ("--pressure", "p".into())]);
+    }
+
+    #[test]
+    fn a_plane_of_any_direction_has_two_sides() {
+        // 0.4 wide and 0.2 high: upright, and turned by 30 degrees about the upright axis.
+        for angle in [0.0, 0.5236f64] {
+            let at = |i: usize| {
+                let x = 0.1 * (i % 5) as f64;
+                [x * angle.cos(), x * angle.sin(), 0.1 * (i / 5) as f64]
+            };
+            let points = Points::F64((0..15).map(at).collect());
+            let attributes = Attributes::default();
+            let slice = StructuredGrid { extent: [0, 4, 0, 2, 0, 0], points, attributes };
+            let c = contents_of_dataset(&Dataset::StructuredGrid(slice));
+            let size = c.size.unwrap();
+            let expected = [0.4, 0.0, 0.2];
+            assert!(c.planar && (0..3).all(|a| (size[a] - expected[a]).abs() < 1e-12), "{c:?}");
+        }
     }
 
     #[test]

@@ -6,7 +6,7 @@ use datasets::resample::{
     self, Lattice, Mark, Mesh, Plane, Report, Resolution, Samples, Walls, in_bodies,
     resample as resample_mesh, revolve, revolved_bounds,
 };
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 
 /// The points at which the index is computed.
 pub(super) enum SamplePoints {
@@ -71,6 +71,23 @@ impl SamplePoints {
             per_point |= ColorBy::find(data, name)?.per_point;
         }
         Ok(SamplePoints::Mesh { mesh: Box::new(mesh_of(data, options)?), per_point, own: None })
+    }
+
+    /// What was done to a plane that slants to the axes, in words.
+    pub(super) fn turn_warning(&self) -> Option<String> {
+        let SamplePoints::Mesh { mesh, .. } = self else { return None };
+        let turn = mesh.turn()?;
+        let (axis, angle) = DQuat::from_mat3(&turn).to_axis_angle();
+        let across = mesh.axis_of_depth().map_or("", |a| ["x", "y", "z"][a]);
+        Some(format!(
+            "the flow is in a plane that slants to the axes: it is turned by {:.3} degrees about \
+             ({:.3}, {:.3}, {:.3}) at the origin, so that it lies across {across}; views, bounds and \
+             bodies are those of the turned flow",
+            angle.to_degrees(),
+            axis.x,
+            axis.y,
+            axis.z
+        ))
     }
 
     /// The values of an array, in the order of the points.

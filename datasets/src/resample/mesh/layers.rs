@@ -1,36 +1,41 @@
 //! Lattices within a mesh: the two layers of points that a plane becomes, and hidden cells.
 
-use super::{HIDDEN_CELL, HIDDEN_POINT, Mesh, PartKind};
+use super::flat::ALONG;
+use super::{HIDDEN_CELL, HIDDEN_POINT, Mesh, PartDepth, PartKind};
 use crate::model::Attributes;
 use glam::DVec3;
-
-/// A direction is along an axis whose component is all of its length but for this part.
-const PLANE: f64 = 1e-12;
 
 impl Mesh {
     /// On which side of a plane that got depth a point lies; `None` for points of solid data.
     pub(in crate::resample) fn side_of_plane(&self, point: usize) -> Option<bool> {
         let part = &self.parts[self.parts.partition_point(|p| p.points.end <= point)];
-        let (axis, local) = (part.extruded?, point - part.points.start);
-        Some(match &part.kind {
-            PartKind::Lattice(dims) => flat_source(local, *dims, axis).1 == 1,
-            PartKind::Cells(_) => 2 * local >= part.points.len(),
+        let local = point - part.points.start;
+        Some(match (part.depth.as_ref()?, &part.kind) {
+            (PartDepth::Layer(axis), PartKind::Lattice(dims)) => {
+                flat_source(local, *dims, *axis).1 == 1
+            }
+            (PartDepth::Sides(above), _) => above[local],
+            _ => 2 * local >= part.points.len(),
         })
     }
 
-    /// The axis along which a plane got its depth; `None` for solid data, and for a plane across no
-    /// axis.
+    /// How often a part of the mesh has each point of the data: twice if that was a plane. `point`
+    /// is one of the part.
+    pub(in crate::resample) fn copies(&self, point: usize) -> usize {
+        let part = &self.parts[self.parts.partition_point(|p| p.points.end <= point)];
+        match part.depth {
+            Some(PartDepth::Layer(_) | PartDepth::Copies) => 2,
+            _ => 1,
+        }
+    }
+
+    /// The axis along which a plane got its depth; `None` for solid data, and for planes across
+    /// several axes.
     pub fn axis_of_depth(&self) -> Option<usize> {
         let mut found = None;
         for part in &self.parts {
-            let axis = part.extruded?;
-            let to_copy = match &part.kind {
-                PartKind::Lattice(dims) => dims[..axis].iter().product(),
-                PartKind::Cells(_) => part.points.len() / 2,
-            };
-            let first = part.points.start;
-            let along = (*self.points.get(first + to_copy)? - *self.points.get(first)?).abs();
-            let of_part = (0..3).find(|&a| along[a] > (1.0 - PLANE) * along.length())?;
+            part.depth.as_ref()?;
+            let of_part = (0..3).find(|&a| part.normal[a].abs() > 1.0 - ALONG)?;
             if found.is_some_and(|f| f != of_part) {
                 return None;
             }

@@ -16,8 +16,7 @@ impl Walls {
         mesh.each_leaf(|leaf, points| {
             let Some(ids) = list(leaf) else { return };
             any = true;
-            // A plane has its points twice.
-            let layers = if mesh.side_of_plane(points.start).is_some() { 2 } else { 1 };
+            let layers = mesh.copies(points.start);
             let count = points.len() / layers;
             for id in (0..ids.tuples()).map(|i| ids.get(i, 0) as usize).filter(|i| *i < count) {
                 (0..layers).for_each(|l| self.of_points[points.start + l * count + id] = true);

@@ -56,7 +56,7 @@ impl Velocity {
     /// `None` without arrays that have the name of a velocity or of its components.
     pub(super) fn of(mesh: &Mesh, data: &Dataset) -> Option<Velocity> {
         let leaves = data.leaves();
-        let across = mesh.axis_of_depth();
+        let across = mesh.axis_of_depth().filter(|_| mesh.turn().is_none());
         let arrays = || leaves.iter().filter_map(|d| d.attributes());
         let of_points = arrays().find_map(|a| VelocityArrays::among(&a.point, across));
         let of_cells = || arrays().find_map(|a| VelocityArrays::among(&a.cell, across));
@@ -70,7 +70,8 @@ impl Velocity {
             if per_point { mesh.gather_points(data, of) } else { mesh.gather_cells(data, of) }
         };
         let [x, y, z] = [component(0), component(1), component(2)];
-        let values = (0..x.len()).map(|i| DVec3::new(x[i], y[i], z[i])).collect();
+        let turn = mesh.turn().unwrap_or_default();
+        let values = (0..x.len()).map(|i| turn * DVec3::new(x[i], y[i], z[i])).collect();
         let mut velocity = Velocity { name: found.name, per_point, values, mean: DVec3::ZERO };
         velocity.mean = velocity.mean_of(mesh);
         Some(velocity)
@@ -136,7 +137,7 @@ impl Velocity {
 impl Walls {
     /// Points at rest beside gas in motion.
     pub(super) fn add_without_slip(&mut self, mesh: &Mesh, data: &Dataset) {
-        let across = mesh.axis_of_depth();
+        let across = mesh.axis_of_depth().filter(|_| mesh.turn().is_none());
         let of_leaf = |d: &&Dataset| VelocityArrays::among(&d.attributes()?.point, across);
         let Some(found) = data.leaves().iter().find_map(of_leaf) else { return };
         let speed = |a: &Attributes, i: usize| found.speed(|name| a.point_array(name), i);
