@@ -25,7 +25,7 @@ pub use cells::{CellType, Cells};
 pub use coloring::ColorBy;
 pub use lines::{PointSet, Polyline};
 pub use surface::SurfaceReport;
-pub use wall_names::{WALL_POINTS, is_name_of_body};
+pub use wall_names::{BAFFLES, WALL_POINTS, is_name_of_body};
 
 use glam::{DMat3, DVec3};
 

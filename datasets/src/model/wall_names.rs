@@ -1,8 +1,12 @@
-//! How data sets say which parts of their border are walls: a list of points, and names.
+//! How data sets say which parts of their border are walls: lists of points and of cells, and names.
 
 /// Name of the field data that lists the points of walls, counted from 0. A data set that has it
 /// has no other walls.
 pub const WALL_POINTS: &str = "wall points";
+
+/// Name of the field data that lists walls without thickness: two cells for each face, counted from
+/// 0, between which one stands.
+pub const BAFFLES: &str = "baffles";
 
 /// Words in names of patches and blocks that are bodies.
 const BODIES: [&str; 30] = [

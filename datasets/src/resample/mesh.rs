@@ -1,6 +1,7 @@
 //! Represents any data set as points and solid cells, numbered consecutively over all blocks.
 //! Lattices keep their implicit cells.
 
+mod baffles;
 mod faces;
 mod flat;
 mod layers;
@@ -35,6 +36,8 @@ pub struct Mesh {
     higher_order: usize,
     computed: Computed,
     turn: Option<DMat3>,
+    /// Pairs of cells with a wall between them, the lower number first, in order.
+    baffles: Vec<[u32; 2]>,
 }
 
 /// A cell whose box is longer than this part of the mesh's is the only one along that axis.
@@ -138,12 +141,14 @@ impl Mesh {
             higher_order: 0,
             computed: Computed::default(),
             turn: None,
+            baffles: vec![],
         };
         let mut flat = 0;
         for (number, leaf) in data.leaves().into_iter().enumerate() {
             let before = mesh.parts.len();
             flat += usize::from(mesh.add(leaf, plane)?);
             mesh.parts[before..].iter_mut().for_each(|p| p.leaf = number);
+            mesh.add_baffles(leaf, before);
             let Some(Plane::Extrude { span }) = plane else { continue };
             for part in before..mesh.parts.len() {
                 if mesh.parts[part].depth.is_none() && mesh.stretch_layer(part, span) {

@@ -259,7 +259,7 @@ impl Piecewise<'_, '_> {
                 break;
             }
             let Beyond::Cell(cell) = inside else {
-                match self.next_cell(direction, speed, inside, slack_m, gap_m) {
+                match self.next_cell(direction, speed, [from, inside], slack_m, gap_m) {
                     Ok(cell) => (from, inside) = (inside, Beyond::Cell(cell)),
                     Err(end) => return end,
                 }
@@ -308,18 +308,25 @@ impl Piecewise<'_, '_> {
         true
     }
 
-    /// Goes on straight to the next cell. `before` is what was beyond the last one.
+    /// Goes on straight to the next cell. `last` is the cell that the ray left, if it did, and
+    /// `before` what was beyond.
     fn next_cell(
         &mut self,
         direction: DVec3,
         speed: f64,
-        before: Beyond,
+        [last, before]: [Beyond; 2],
         slack_m: f64,
         gap_m: f64,
     ) -> Result<u32, End> {
         let gas = self.paths.gas;
         let at_m = self.ray.position_m();
         let entry = self.walker.enter(at_m, direction, f64::INFINITY, slack_m);
+        if let (Beyond::Cell(last), Beyond::Wall, Some(entry)) = (last, before, entry)
+            && gas.walls != Node::Gas
+            && self.walker.has_baffle(last, entry.cell)
+        {
+            return Err(End::Stopped(gas.walls));
+        }
         // Beyond the box is the reference medium.
         let left_m = clip(at_m - self.paths.low_m, direction, self.paths.size_m)[1].max(0.0);
         let stretch_m = entry.map_or(left_m, |e| e.distance);

@@ -5,10 +5,12 @@
 //! move. Fields on cells become cell arrays. A case that is one cell thick, between patches of type
 //! `empty` or `wedge`, becomes a plane of polygons, which schlieren extrudes or revolves. The
 //! patches of the boundary are listed in the field data `boundary patches`, one text
-//! `NAME TYPE FACES` each: a `wall` is a body, a `patch` is open.
+//! `NAME TYPE FACES` each: a `wall` is a body, a `patch` is open. Two faces of walls at one place
+//! are a wall without thickness, listed as [`crate::model::BAFFLES`].
 //!
 //! Source: OpenFOAM User Guide, chapters "Case structure", "Mesh description" and "Boundaries".
 
+mod baffles;
 mod case_folder;
 mod collated;
 mod fields;
@@ -21,6 +23,7 @@ use super::error::Fault;
 use super::options::step_at;
 use super::{Content, LoadedFile, OpenOptions, ReadError};
 use crate::model::Dataset;
+use baffles::Baffles;
 use case_folder::CaseFolder;
 use plane::Symmetry;
 use poly_mesh::PolyMesh;
@@ -96,6 +99,8 @@ pub fn read(path: &Path, options: &OpenOptions) -> Result<LoadedFile, ReadError>
         }
     };
     let patches = patches(&mesh);
+    let baffles = Baffles::of(&mesh);
+    warnings.extend(baffles.warning());
     let mut grid = match plane::flattened(&mesh) {
         Some((mut plane, symmetry)) => {
             if symmetry == Symmetry::Axis {
@@ -114,6 +119,7 @@ pub fn read(path: &Path, options: &OpenOptions) -> Result<LoadedFile, ReadError>
         None => shapes::solid_cells(mesh),
     };
     grid.attributes.cell = arrays;
+    grid.attributes.field.extend(baffles.array());
     grid.attributes.text.push((BOUNDARY_PATCHES.into(), patches));
     let data = Dataset::UnstructuredGrid(grid);
     data.check().map_err(|e| fault(e.into()))?;

@@ -1,7 +1,8 @@
 //! Finds which cell lies behind each face of a cell.
 //!
 //! Faces are compared by their points, as in `boundary_faces` of the model. Points of different
-//! blocks at the same place are one, so that a face of two blocks is none of the border.
+//! blocks at the same place are one, so that a face of two blocks is none of the border. A wall
+//! without thickness is one for the cells on both its sides.
 
 use super::Mesh;
 use rayon::prelude::*;
@@ -73,7 +74,7 @@ impl Neighbours {
         let mut crowded = 0;
         for shared in keys.chunk_by(|a, b| a.0 == b.0) {
             match shared {
-                [(_, a, face_a), (_, b, face_b)] if a != b => {
+                [(_, a, face_a), (_, b, face_b)] if a != b && !mesh.has_baffle(*a, *b) => {
                     let seen =
                         |cell: u32| if mesh.is_hidden(cell as usize) { HIDDEN } else { cell };
                     (beyond[*face_a], beyond[*face_b]) = (seen(*b), seen(*a));

@@ -158,6 +158,12 @@ impl<'a> CellWalker<'a> {
         Some((distance, Beyond::of(beyond)))
     }
 
+    /// Whether a wall without thickness is between two cells. Both end there ([`Beyond::Wall`]), and
+    /// a line that leaves one of them enters the other at once.
+    pub fn has_baffle(&self, one: u32, other: u32) -> bool {
+        self.field.mesh.has_baffle(one, other)
+    }
+
     /// Whether the line from `at` in `direction`, of length one, is in a body somewhere within
     /// `most`, where it is outside all cells. No face tells of a body that fills the span of the
     /// mesh, along which the line runs. False where the walls of the mesh are not known.
