@@ -18,6 +18,7 @@
 //!
 //! [`WALL_POINTS`]: crate::model::WALL_POINTS
 
+mod baffles;
 mod known;
 mod parts;
 mod sides;
@@ -41,6 +42,8 @@ pub struct Walls {
     rings: Vec<u32>,
     faces: Vec<BorderFace>,
     evidence: Vec<String>,
+    /// Cells with a wall without thickness between them.
+    baffles: Vec<[u32; 2]>,
     /// Part of the area of these faces of which nothing tells what is behind them.
     undecided: f64,
 }
@@ -67,6 +70,7 @@ impl Walls {
         if !listed {
             walls.add_blocks(mesh, data);
             walls.add_without_slip(mesh, data);
+            walls.add_baffles(mesh);
         }
         let sides = Sides::of(mesh, revolved);
         let velocity = if listed { None } else { Velocity::of(mesh, data) };

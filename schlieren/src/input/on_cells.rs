@@ -60,6 +60,13 @@ pub fn cells_from_dataset(
         Outside::Auto => Walls::find(&mesh, data, false),
         _ => Walls::default(),
     };
+    if walls.baffles() > 0 {
+        report.warnings.push(format!(
+            "{} faces between cells are walls without thickness, which stop light: the file has \
+             their points twice, with a velocity of zero on both sides",
+            walls.baffles()
+        ));
+    }
     plausible::warn_size(high - low, &mut report);
     let cells = CellField::with_walls(mesh, samples, options.reconstruction, &walls)?;
     report.warnings.extend(cells.report().warnings());

@@ -31,7 +31,12 @@ impl Mesh {
         // Cells that the mesh leaves out have no walls.
         let of_mesh = |i: usize, side: usize| cells.get(&of_leaf(i, side)).copied().flatten();
         let pairs = (0..list.tuples()).filter_map(|i| Some([of_mesh(i, 0)?, of_mesh(i, 1)?]));
-        self.baffles.extend(pairs.map(|[a, b]| [a.min(b), a.max(b)]));
+        self.insert_baffles(&pairs.collect::<Vec<_>>());
+    }
+
+    /// Adds pairs of cells of the mesh.
+    pub(in crate::resample) fn insert_baffles(&mut self, pairs: &[[u32; 2]]) {
+        self.baffles.extend(pairs.iter().map(|&[a, b]| [a.min(b), a.max(b)]));
         self.baffles.sort_unstable();
         self.baffles.dedup();
     }

@@ -101,6 +101,17 @@ impl Neighbours {
         }
     }
 
+    /// Takes the faces between these cells as walls.
+    pub(in crate::resample) fn mark_baffles(&mut self, pairs: &[[u32; 2]]) {
+        for &[a, b] in pairs {
+            for (cell, other) in [(a as usize, b), (b as usize, a)] {
+                let Some(&[first, end]) = self.starts.get(cell..cell + 2) else { continue };
+                let of_cell = self.beyond[first..end].iter_mut();
+                of_cell.filter(|c| **c == other).for_each(|c| *c = WALL);
+            }
+        }
+    }
+
     /// What lies behind the faces of a cell: a cell, or one of the constants.
     pub(in crate::resample) fn of_cell(&self, cell: usize) -> &[u32] {
         &self.beyond[self.starts[cell]..self.starts[cell + 1]]

@@ -214,6 +214,8 @@ impl CellField {
             });
         }
         neighbours.mark_walls(walls.of_cells());
+        neighbours.mark_baffles(walls.cells_at_baffles());
+        mesh.insert_baffles(walls.cells_at_baffles());
         let border = Border::of_gas(&mesh, &neighbours, &kinds);
         let hidden = Border::of_hidden(&mesh, &neighbours, &kinds);
         let bodies = Bodies::of(&mesh, walls);
