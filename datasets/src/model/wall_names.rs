@@ -1,4 +1,5 @@
-//! How data sets say which parts of their border are walls: lists of points and of cells, and names.
+//! How data sets say which parts of their border are walls: lists of points and of cells, and
+//! names.
 
 /// Name of the field data that lists the points of walls, counted from 0. A data set that has it
 /// has no other walls.

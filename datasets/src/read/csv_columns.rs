@@ -27,7 +27,8 @@ const NAMES: &[&str] = &[
 ];
 
 /// Names, as in [`NAMES`], of the radius, of the coordinate along the axis, and of the angle about
-/// it in axisymmetric tables. `Radial Coordinate` is Fluent's and CFD-Post's, `r` with `z` COMSOL's.
+/// it in axisymmetric tables. `Radial Coordinate` is Fluent's and CFD-Post's, `r` with `z` is
+/// COMSOL's.
 const RADII: &[&str] = &[
     "r",
     "radius",

@@ -42,8 +42,8 @@ pub(crate) fn read(path: &Path, options: &OpenOptions) -> Result<LoadedFile, Rea
             None => "",
         });
         warnings.push(format!(
-            "the table is axisymmetric by the names of its columns: x is `{along}`, along the axis, \
-             and y is `{radius}`, the distance from it"
+            "the table is axisymmetric by the names of its columns: x is `{along}`, along the \
+             axis, and y is `{radius}`, the distance from it"
         ));
         if let Some(attributes) = data.attributes_mut() {
             attributes.set_axisymmetric();

@@ -81,8 +81,8 @@ impl SamplePoints {
         let across = mesh.axis_of_depth().map_or("", |a| ["x", "y", "z"][a]);
         Some(format!(
             "the flow is in a plane that slants to the axes: it is turned by {:.3} degrees about \
-             ({:.3}, {:.3}, {:.3}) at the origin, so that it lies across {across}; views, bounds and \
-             bodies are those of the turned flow",
+             ({:.3}, {:.3}, {:.3}) at the origin, so that it lies across {across}; views, bounds \
+             and bodies are those of the turned flow",
             angle.to_degrees(),
             axis.x,
             axis.y,

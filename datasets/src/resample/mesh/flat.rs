@@ -111,7 +111,8 @@ impl Mesh {
     /// // Four points of the plane y = x.
     /// let corners = [[0.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 1.0, 1.0]];
     /// let points = Points::F64(corners.to_vec());
-    /// let slice = StructuredGrid { extent: [0, 1, 0, 1, 0, 0], points, attributes: Default::default() };
+    /// let (extent, attributes) = ([0, 1, 0, 1, 0, 0], Default::default());
+    /// let slice = StructuredGrid { extent, points, attributes };
     /// let mesh = Mesh::with_plane(&Dataset::StructuredGrid(slice), Plane::Extrude { span: 0.5 })?;
     /// let (low, high) = mesh.bounds();
     /// // As wide as the diagonal, as high as it was, and as deep as the span.

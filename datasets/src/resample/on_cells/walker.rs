@@ -158,8 +158,8 @@ impl<'a> CellWalker<'a> {
         Some((distance, Beyond::of(beyond)))
     }
 
-    /// Whether a wall without thickness is between two cells. Both end there ([`Beyond::Wall`]), and
-    /// a line that leaves one of them enters the other at once.
+    /// Whether a wall without thickness is between two cells. Both end there ([`Beyond::Wall`]),
+    /// and a line that leaves one of them enters the other at once.
     pub fn has_baffle(&self, one: u32, other: u32) -> bool {
         self.field.mesh.has_baffle(one, other)
     }
