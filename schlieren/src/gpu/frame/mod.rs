@@ -172,12 +172,16 @@ impl GpuPaths<'_> {
             Light::Photons { .. } => 1,
             Light::Beams { per_side } => u64::from(per_side),
         };
-        // Numbers of pixels, tiles and corners are exact in f32 below.
-        const LIMIT: u64 = 1 << 24;
+        // Numbers of pixels and corners of a row are exact in f32, and a row is one row of work
+        // groups.
+        const LIMIT: u64 = 4_000_000;
+        if width.max(height) * per_side > LIMIT {
+            return Err(refused(format!("it has more than {LIMIT} cells along a side")));
+        }
         let image = technique.image.map_or(0, |i| size_of_val(i.pixels()));
         let largest = (4 * layout.words()).max(image) as u64;
         let binding = self.gpu().binding_bytes();
-        if width * per_side > LIMIT || height * per_side > LIMIT || largest > binding {
+        if largest > binding {
             return Err(refused(format!(
                 "its sums take {largest} bytes, and a binding of the device has {binding}"
             )));
