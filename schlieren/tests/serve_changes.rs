@@ -146,6 +146,33 @@ fn lattice_smoothing_and_outside_are_chosen_on_the_page() {
 }
 
 #[test]
+fn cells_what_is_between_points_and_hidden_cells_are_chosen_on_the_page() {
+    let s = Server::start(&["--size", "48x24", "--samples", "4"]);
+    let in_lattice = s.finished().rgb;
+    // The cells of the same data give nearly the same picture.
+    let state = s.change(&json!({"flow": {"on_cells": true}}));
+    assert_eq!(state["effective"]["flow"]["on_cells"], true, "{state}");
+    let cubic = s.finished();
+    assert_eq!(cubic.info["error"], Value::Null);
+    assert!(changed(&in_lattice, &cubic.rgb) < 0.1, "the same flow on its cells");
+    s.change(&json!({"flow": {"reconstruction": "linear", "hidden": "gas"}}));
+    let linear = s.finished();
+    assert_eq!(linear.info["error"], Value::Null);
+    assert!(linear.rgb != cubic.rgb, "linear cells bend light at their faces");
+    // What counts in nodes is refused, by its name.
+    let text = refusal(&s, &json!({"flow": {"resample_nodes": 9}}));
+    assert!(text.contains("flow.on_cells (--on-cells) traces light without one"), "{text}");
+    let lattice = json!({"on_cells": false, "reconstruction": "cubic", "hidden": "solid"});
+    s.change(&json!({ "flow": lattice }));
+    assert_eq!(s.finished().rgb, in_lattice);
+    for wrong in [json!({"hidden": "stone"}), json!({"on_cells": 1}), json!({"reconstruction": 3})]
+    {
+        let text = refusal(&s, &json!({ "flow": wrong }));
+        assert!(text.contains("not a flow"), "{wrong}: {text}");
+    }
+}
+
+#[test]
 fn what_cannot_be_shown_goes_back_to_what_was() {
     let s = Server::start(&SMALL);
     let first = s.finished().rgb;

@@ -4,6 +4,9 @@ import { check, choice, number, shower, text } from "./rows.js";
 import { ROWS } from "./help.js";
 
 const KINDS = { density: "density", temperature: "temperature, pressure", n_minus_1: "n − 1" };
+// Cells have none of what counts in nodes.
+const CELLS = { on_cells: true, smoothing_nodes: 0, average_jumps: false, resample_nodes: null };
+const LATTICE = { on_cells: false };
 const names = state => state.arrays.map(a => a.name);
 
 function kindOf(state) {
@@ -53,6 +56,11 @@ function rowsOf(state) {
   }
   rows.push(choice("outside the mesh", ["auto", "blank", "solid", "gas"], s => flow(s).outside,
     v => ({ flow: { outside: v } })));
+  rows.push(choice("hidden cells", ["blank", "solid", "gas"], s => flow(s).hidden,
+    v => ({ flow: { hidden: v } })));
+  rows.push(choice("between points", ["cubic", "linear"], s => flow(s).reconstruction,
+    v => ({ flow: { reconstruction: v } })));
+  rows.push(check("on cells", s => flow(s).on_cells, v => ({ flow: v ? CELLS : LATTICE })));
   if (flow(state).on_cells) return rows;
   rows.push(number("smoothing", "nodes", 1, s => flow(s).smoothing_nodes,
     v => ({ flow: { smoothing_nodes: v } })));

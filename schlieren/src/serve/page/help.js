@@ -40,6 +40,10 @@ export const ROWS = {
   "index from": "Which arrays of the file the index of refraction is computed from.",
   "outside the mesh": "What is where the data end: auto takes walls for bodies and open borders "
     + "for gas.",
+  "hidden cells": "What cells are that the solver hides, as those of an overset mesh.",
+  "between points": "Values between the points of a mesh: cubic is smooth, linear bends light at "
+    + "the faces of its cells.",
+  "on cells": "Light goes through the cells of the file themselves, and not through a lattice.",
   "smoothing": "Standard deviation of a smoothing of the density, for shocks that are one cell "
     + "wide; 0 for none.",
   "average jumps": "Jumps from one node to the next become averages over cells, which shocks "

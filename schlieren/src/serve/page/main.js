@@ -122,6 +122,9 @@ const WORDS = [
   ["flow.smoothing_nodes, --smoothing", "“smoothing”"],
   ["march.tolerance_rad, --tolerance", "“tolerance”"],
   ["flow.outside", "“outside the mesh”"],
+  ["flow.hidden", "“hidden cells”"],
+  ["flow.reconstruction", "“between points”"],
+  ["flow.on_cells (--on-cells)", "“on cells”"],
 ];
 const inWords = warning => WORDS.reduce((w, [key, label]) => w.replaceAll(key, label), warning);
 

@@ -7,8 +7,16 @@ use serde_json::{Map, Value};
 
 /// The arrays of the index. Each of the first three is an alternative to the others.
 const MEDIUM_KEYS: [&str; 4] = ["density", "temperature", "n_minus_1", "pressure"];
-/// How the data become a lattice.
-const LATTICE_KEYS: [&str; 4] = ["outside", "smoothing_nodes", "average_jumps", "resample_nodes"];
+/// How the data become a lattice, or that light is traced through their cells.
+const LATTICE_KEYS: [&str; 7] = [
+    "outside",
+    "hidden",
+    "reconstruction",
+    "on_cells",
+    "smoothing_nodes",
+    "average_jumps",
+    "resample_nodes",
+];
 
 /// The names of `flow` that cannot be changed from the page are refused: files above all.
 pub(super) fn check_keys(flow: &Map<String, Value>) -> Result<(), RefusedChange> {
@@ -53,6 +61,9 @@ impl Session {
                 smoothing_nodes: before.smoothing_nodes,
                 average_jumps: before.average_jumps,
                 outside: before.outside,
+                hidden: before.hidden,
+                reconstruction: before.reconstruction,
+                on_cells: before.on_cells,
                 ..medium.clone()
             },
             Some(curves) if arrays.is_empty() => self.with_curves(before, curves)?,
