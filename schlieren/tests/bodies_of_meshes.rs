@@ -3,10 +3,10 @@
 
 mod outlines;
 
-use datasets::model::Dataset;
+use datasets::model::{Block, DataArray, Dataset, Points, PolyData, UnstructuredGrid, Values};
 use glam::DVec3;
 use outlines::{Plane, hide, options, statuses};
-use schlieren::input::Outside;
+use schlieren::input::{Medium, Options, Outside, cells_from_dataset};
 use schlieren::path::Status::{Blocked, Free};
 
 /// Places in the cylinder, in the gas, in a corner of the box, and beside the box.
@@ -102,5 +102,42 @@ fn a_grid_whose_seam_is_open_by_rounding_has_its_body() {
         expected[..3].fill(Blocked);
         let of = |outside| statuses(&data, &options(&data, outside), DVec3::Z, &places);
         assert_eq!(of(Outside::Auto), [expected.clone(), expected], "single: {single}");
+    }
+}
+
+/// Surfaces are found by their places, so the unit of length must not come between.
+#[test]
+fn surfaces_with_the_name_of_a_body_are_walls_in_any_unit_of_length() {
+    // A cube of 6 x 6 x 6 cells without a step below, which nothing else tells from an open border.
+    const N: usize = 6;
+    let place = |i: usize| [i % (N + 1), i / (N + 1) % (N + 1), i / (N + 1).pow(2)];
+    let points = (0..(N + 1).pow(3)).map(|i| place(i).map(|x| 0.1 + 0.3 * x as f64));
+    let mut grid = UnstructuredGrid { points: Points::F64(points.collect()), ..Default::default() };
+    for c in 0..N.pow(3) {
+        let at = [c % N, c / N % N, c / N / N];
+        if at[0] > 2 || at[1] > 1 {
+            let first = at[0] + (N + 1) * (at[1] + (N + 1) * at[2]);
+            grid.types.push(12);
+            grid.cells.push([0, 1, 8, 7, 49, 50, 57, 56].map(|o| (first + o) as u32));
+        }
+    }
+    let density = (0..(N + 1).pow(3)).map(|i| 1.2 + 0.01 * place(i)[0] as f64).collect();
+    grid.attributes.point.push(DataArray::new("density", 1, Values::F64(density)));
+    let of_step = (0..(N + 1).pow(3)).filter(|&i| {
+        let [x, y, _] = place(i);
+        (x == 3 && y <= 2) || (y == 2 && x <= 3)
+    });
+    let of_step = of_step.map(|i| grid.points.get(i).to_array()).collect();
+    let wall = PolyData { points: Points::F64(of_step), ..Default::default() };
+    let block = |name: &str, data| Block { name: name.into(), data };
+    let data = Dataset::MultiBlock(vec![
+        block("internal", Dataset::UnstructuredGrid(grid)),
+        block("wall", Dataset::PolyData(wall)),
+    ]);
+    for length_unit_m in [1.0, 1e-3, 0.0254] {
+        let options = Options { length_unit_m, ..Options::new(Medium::density("density")) };
+        let (_, report) = cells_from_dataset(&data, &options).unwrap();
+        let walls = report.outside.expect("the step is outside").walls_by;
+        assert_eq!(walls, ["the surfaces `wall`"], "{length_unit_m}");
     }
 }

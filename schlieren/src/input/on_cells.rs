@@ -45,7 +45,16 @@ pub fn cells_from_dataset(
         unreachable!("points on cells are those of a mesh")
     };
     let samples = if per_point { Samples::Points(&index) } else { Samples::Cells(&index) };
-    let mesh = mesh.scaled(options.length_unit_m);
+    // Before the mesh is in metres: surfaces of the file are found by their places.
+    let walls = match options.outside {
+        Outside::Auto => Walls::find(&mesh, data, false),
+        _ => Walls::default(),
+    };
+    // With the neighbours of its cells, which scaling forgets.
+    let mesh = match options.length_unit_m {
+        1.0 => *mesh,
+        unit => mesh.scaled(unit),
+    };
     let (low, high) = mesh.bounds();
     for length_m in [mesh.typical_cell(), (high - low).max_element()] {
         if !LENGTHS_M.contains(&length_m) {
@@ -56,10 +65,6 @@ pub fn cells_from_dataset(
             });
         }
     }
-    let walls = match options.outside {
-        Outside::Auto => Walls::find(&mesh, data, false),
-        _ => Walls::default(),
-    };
     if walls.baffles() > 0 {
         report.warnings.push(format!(
             "{} faces between cells are walls without thickness, which stop light: the file has \
