@@ -4,8 +4,9 @@
 //! Resampling gives, beside each value, what the last degree of the polynomials adds to it
 //! ([`datasets::resample::ResampledField::truncation`]). Rays through this difference, taken for a
 //! gas, are bent by the difference of deflections. For thirty gases on two meshes and in two views
-//! (bench's experiment `accuracy-tolerance`), no error is larger than that difference and the
-//! lattice's error together.
+//! (bench's experiment `accuracy-tolerance`), errors are no larger than that difference and the
+//! lattice's error together, but for a shock steeper than its tetrahedra are wide, in one view: 1.3
+//! times.
 
 use super::RESOLUTION_STEP;
 use crate::field::Field;
