@@ -85,12 +85,7 @@ impl Gpu {
             device,
             queue,
             info,
-            // Rounded to whole vectors of four numbers, and limited so that offsets fit 32 bits.
-            binding_bytes: limits
-                .max_storage_buffer_binding_size
-                .min(limits.max_buffer_size)
-                .min(1 << 33)
-                & !15,
+            binding_bytes: largest_binding(&limits),
             storage_buffers: limits.max_storage_buffers_per_shader_stage,
             failure,
             pipelines: Mutex::default(),
@@ -189,6 +184,11 @@ impl Gpu {
     /// library's CPU kernels.
     pub fn is_software(&self) -> bool {
         self.info.device_type == DeviceType::Cpu
+    }
+
+    /// Whether bindings are smaller than the device allows ([`Gpu::with_binding_limit`]).
+    pub(super) fn has_binding_limit(&self) -> bool {
+        self.binding_bytes < largest_binding(&self.device.limits())
     }
 
     /// Size of the largest binding in bytes.
@@ -362,6 +362,12 @@ impl Gpu {
         made.insert(wgsl, pipeline.clone());
         Ok(pipeline)
     }
+}
+
+/// Size of the largest binding in bytes. It is rounded to whole vectors of four numbers, and limited
+/// so that offsets fit 32 bits.
+fn largest_binding(limits: &wgpu::Limits) -> u64 {
+    limits.max_storage_buffer_binding_size.min(limits.max_buffer_size).min(1 << 33) & !15
 }
 
 impl std::fmt::Debug for Gpu {

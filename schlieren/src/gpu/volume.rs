@@ -164,8 +164,8 @@ fn rows_size(gpu: &Gpu, coefficients: [usize; 3]) -> Option<[u32; 3]> {
     let limits = gpu.device.limits();
     let fits = size[0].max(size[1]) <= limits.max_texture_dimension_2d
         && size[2] <= limits.max_texture_array_layers
-        && bytes <= MOST_ROW_BYTES.min(gpu.binding_bytes());
-    (gpu.is_software() && fits).then_some(size)
+        && bytes <= MOST_ROW_BYTES;
+    (gpu.is_software() && !gpu.has_binding_limit() && fits).then_some(size)
 }
 
 /// Uploads coefficients, four in each texel.
