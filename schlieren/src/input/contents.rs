@@ -358,7 +358,7 @@ mod tests {
     #[test]
     fn a_plane_of_any_direction_has_two_sides() {
         // 0.4 wide and 0.2 high: upright, and turned by 30 degrees about the upright axis.
-        for angle in [0.0, 0.5236f64] {
+        for angle in [0.0, std::f64::consts::FRAC_PI_6] {
             let at = |i: usize| {
                 let x = 0.1 * (i % 5) as f64;
                 [x * angle.cos(), x * angle.sin(), 0.1 * (i / 5) as f64]
