@@ -364,8 +364,8 @@ impl Gpu {
     }
 }
 
-/// Size of the largest binding in bytes. It is rounded to whole vectors of four numbers, and limited
-/// so that offsets fit 32 bits.
+/// Size of the largest binding in bytes. It is rounded to whole vectors of four numbers, and
+/// limited so that offsets fit 32 bits.
 fn largest_binding(limits: &wgpu::Limits) -> u64 {
     limits.max_storage_buffer_binding_size.min(limits.max_buffer_size).min(1 << 33) & !15
 }
