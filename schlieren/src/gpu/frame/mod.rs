@@ -179,11 +179,13 @@ impl GpuPaths<'_> {
             return Err(refused(format!("it has more than {LIMIT} cells along a side")));
         }
         let image = technique.image.map_or(0, |i| size_of_val(i.pixels()));
-        let largest = (4 * layout.words()).max(image) as u64;
+        let corners = submissions::corner_bytes(&job);
+        let largest = (4 * layout.words()).max(image).max(corners) as u64;
         let binding = self.gpu().binding_bytes();
         if largest > binding {
             return Err(refused(format!(
-                "its sums take {largest} bytes, and a binding of the device has {binding}"
+                "one of its buffers takes {largest} bytes, and a binding of the device has \
+                 {binding}"
             )));
         }
 
@@ -200,11 +202,17 @@ impl GpuPaths<'_> {
             )));
         }
 
-        // A device that fails loses its film, so the whole film is exposed again.
+        self.run_to_end(&job)
+    }
+
+    /// Exposes the film, on a reopened device if it must be: a device that fails loses its film, so
+    /// the whole film is exposed again.
+    fn run_to_end(&self, job: &Job<'_>) -> Result<(Vec<u32>, Tally), NotExposed> {
+        let [width, height] = job.area();
         let mut failed = false;
         loop {
             let on_device = self.on_device();
-            match self.run(&on_device, &job) {
+            match self.run(&on_device, job) {
                 Ok(None) => return Err(NotExposed::Cancelled),
                 Ok(Some(words)) => {
                     let (mut tally, steps) = outcomes(&words);
@@ -221,11 +229,12 @@ impl GpuPaths<'_> {
                     return Ok((words, tally));
                 }
                 Err(failure) => {
-                    failed = true;
-                    self.cpu_fallback_paths.set_cause(&failure.error);
+                    // If the device stays, or is given up, the rays that go out next tell it.
                     if let Err(why) = self.replace_device(&failure) {
-                        return Err(refused(super::failure_message(&why)));
+                        return Err(NotExposed::Refused(super::failure_message(&why)));
                     }
+                    self.cpu_fallback_paths.set_cause(&failure.error);
+                    failed = true;
                 }
             }
         }
@@ -245,5 +254,62 @@ impl GpuPaths<'_> {
         }
         .and_then(|go_on| if go_on { frame.read(self).map(Some) } else { Ok(None) })
         .map_err(failure)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::field::Field;
+    use crate::gpu::{Gpu, GpuOptions};
+    use crate::interpolate::Interpolant;
+    use crate::optics::Optics;
+    use crate::technique::Technique;
+    use crate::view::{Axis, View};
+    use glam::DVec3;
+    use rt_core::sampler::Sampling;
+
+    /// The march on the device goes on, so nothing may say that the CPU computes the rest.
+    #[test]
+    fn a_frame_that_fails_on_a_sound_device_says_nothing_of_its_rays() {
+        let gpu = match Gpu::shared() {
+            Ok(gpu) => gpu,
+            Err(e) => {
+                let required = std::env::var_os("RTSV_REQUIRE_PEERS").is_some_and(|v| v == "1");
+                assert!(!required, "{e}");
+                return;
+            }
+        };
+        let field =
+            Field::from_fn([5; 3], [0.25; 3], DVec3::splat(-0.5), 1.0, |p| 1e-5 * p.x).unwrap();
+        let view = View::along(Axis::Z, DVec3::ZERO);
+        let options = GpuOptions::default();
+        let paths = GpuPaths::new(gpu, &field, view, Interpolant::BSpline, options).unwrap();
+        let framing = Framing::fitted(8, 8, [1.0, 1.0]);
+        let technique = Technique::Shadowgraph(Optics::DEFAULT);
+        let exposure = Exposure {
+            paths: &paths,
+            technique: &technique,
+            solids: None,
+            sampling: Sampling::Sobol,
+            seed: 0,
+            margin_px: 0,
+            tilted_beams: false,
+        };
+        let broken = TechniqueShader { text: "no shader".into(), ..TechniqueShader::default() };
+        let job = Job {
+            exposure: &exposure,
+            framing,
+            layout: FilmLayout::of_picture::<1>(&framing),
+            technique: &broken,
+            light: Light::Photons { passes: 0..1 },
+            filter: Some(&[1.0]),
+            cancel: &AtomicBool::new(false),
+            progress: &|_| (),
+        };
+        let refused = paths.run_to_end(&job);
+        assert!(matches!(refused, Err(NotExposed::Refused(_))), "{refused:?}");
+        assert!(paths.gpu().failure().is_none());
+        assert_eq!(crate::path::LightPaths::device_warning(&paths), None);
     }
 }

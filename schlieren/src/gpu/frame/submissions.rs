@@ -101,10 +101,7 @@ impl<'a> FrameOnDevice<'a> {
         let (frame, film, march, image) = made;
         let rays = match job.light {
             Light::Photons { .. } => PER_SUBMISSION,
-            Light::Beams { per_side } => {
-                let columns = job.columns(per_side);
-                columns * (rows_at_once(columns) + 1)
-            }
+            Light::Beams { per_side } => corners_at_once(job, per_side),
         };
         let bodies = exposure
             .solids
@@ -127,8 +124,7 @@ impl<'a> FrameOnDevice<'a> {
             Light::Beams { per_side } => {
                 params.per_row = job.columns(per_side) as u32;
                 params.parts = per_side;
-                let words = rays * (2 + layout.channels());
-                let corners = gpu.checked(|| gpu.buffer(4 * words, storage))?;
+                let corners = gpu.checked(|| gpu.buffer(corner_bytes(job), storage))?;
                 let pipeline = gpu.pipeline(shader.corners(), "trace_corners")?;
                 let mut own =
                     vec![(0, frame.as_entire_binding()), (2, corners.as_entire_binding())];
@@ -150,25 +146,7 @@ impl<'a> FrameOnDevice<'a> {
                     Light::Photons { passes } => 1.0 / passes.len() as f32,
                     Light::Beams { .. } => 1.0,
                 };
-                let weights: Vec<f32> = weights.iter().map(|w| *w as f32).collect();
-                let bytes = layout.picture_bytes() as usize;
-                let [rows, pixels, of_weights] = gpu.checked(|| {
-                    let of_weights = gpu.buffer(size_of_val(&weights[..]), storage | to_device);
-                    gpu.queue.write_buffer(&of_weights, 0, bytemuck::cast_slice(&weights));
-                    let pixels = gpu.buffer(bytes, storage | BufferUsages::COPY_SRC);
-                    [gpu.buffer(bytes, storage), pixels, of_weights]
-                })?;
-                paths.work.add_to_device(of_weights.size());
-                let bind = |of_rows: bool| {
-                    let pipeline = gpu.pipeline(shader.filter(of_rows), "filter_noise")?;
-                    let (from, to) =
-                        if of_rows { ((1, &film), (2, &rows)) } else { ((2, &rows), (5, &pixels)) };
-                    let own = [(0, &frame), from, to, (6, &of_weights)]
-                        .map(|(i, b)| (i, b.as_entire_binding()));
-                    let groups = gpu.bind(&pipeline, [&[], &own])?;
-                    Ok::<_, GpuError>((pipeline, groups))
-                };
-                Some((vec![bind(true)?, bind(false)?], pixels))
+                Some(filter(paths, &gpu, &shader, layout, weights, [&frame, &film])?)
             }
         };
         let (layout, progress) = (*layout, job.progress);
@@ -337,6 +315,34 @@ impl<'a> FrameOnDevice<'a> {
     }
 }
 
+/// The kernels that filter a film along rows and columns, and the picture.
+fn filter(
+    paths: &GpuPaths<'_>,
+    gpu: &Gpu,
+    shader: &FrameShader<'_>,
+    layout: &FilmLayout,
+    weights: &[f64],
+    [frame, film]: [&wgpu::Buffer; 2],
+) -> Result<(Vec<BoundKernel>, wgpu::Buffer), GpuError> {
+    let weights: Vec<f32> = weights.iter().map(|w| *w as f32).collect();
+    let (bytes, storage) = (layout.picture_bytes() as usize, BufferUsages::STORAGE);
+    let [rows, pixels, of_weights] = gpu.checked(|| {
+        let of_weights = gpu.buffer(size_of_val(&weights[..]), storage | BufferUsages::COPY_DST);
+        gpu.queue.write_buffer(&of_weights, 0, bytemuck::cast_slice(&weights));
+        let pixels = gpu.buffer(bytes, storage | BufferUsages::COPY_SRC);
+        [gpu.buffer(bytes, storage), pixels, of_weights]
+    })?;
+    paths.work.add_to_device(of_weights.size());
+    let bind = |of_rows: bool| {
+        let pipeline = gpu.pipeline(shader.filter(of_rows), "filter_noise")?;
+        let (from, to) = if of_rows { ((1, film), (2, &rows)) } else { ((2, &rows), (5, &pixels)) };
+        let own = [(0, frame), from, to, (6, &of_weights)].map(|(i, b)| (i, b.as_entire_binding()));
+        let groups = gpu.bind(&pipeline, [&[], &own])?;
+        Ok::<_, GpuError>((pipeline, groups))
+    };
+    Ok((vec![bind(true)?, bind(false)?], pixels))
+}
+
 /// Records kernels with these numbers of work groups.
 fn run(commands: &mut wgpu::CommandEncoder, kernels: &[BoundKernel], groups: &[[u32; 2]]) {
     let mut pass = commands.begin_compute_pass(&Default::default());
@@ -354,6 +360,22 @@ fn bits(rays: usize, is_set: impl Fn(usize) -> bool + Sync) -> Vec<u32> {
         (32 * w..rays.min(32 * w + 32)).fold(0, |a, ray| a | u32::from(is_set(ray)) << (ray % 32))
     };
     (0..rays.div_ceil(32)).into_par_iter().map(word).collect()
+}
+
+/// Corners of beams in a submission: there is one row more than rows of cells.
+fn corners_at_once(job: &Job<'_>, per_side: u32) -> usize {
+    let columns = job.columns(per_side);
+    columns * (rows_at_once(columns) + 1)
+}
+
+/// Bytes of these corners: a shift, and energies. 0 for photons.
+pub(super) fn corner_bytes(job: &Job<'_>) -> usize {
+    match job.light {
+        Light::Photons { .. } => 0,
+        Light::Beams { per_side } => {
+            4 * corners_at_once(job, per_side) * (2 + job.layout.channels())
+        }
+    }
 }
 
 /// Rows of cells in a submission, for rows of this many corners.

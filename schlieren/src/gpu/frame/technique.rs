@@ -60,16 +60,16 @@ impl<'a> TechniqueShader<'a> {
     }
 
     fn schlieren(&mut self, s: &'a Schlieren) {
-        let band = s.band();
-        self.text += &format!(
-            "const AVERAGED = {};\nconst BAND = {};\n",
-            !s.samples_the_source(),
-            band.is_some()
-        );
+        let (band, kind) = (s.band(), s.plane().kind());
+        // A point has no area over which a circle could be averaged.
+        let is_point = *s.plane().image() == SourceImage::Point;
+        let circle_at_point = is_point && matches!(kind, Kind::Other(Cutoff::Aperture(_)));
+        let averaged = !s.samples_the_source() && !circle_at_point;
+        self.text += &format!("const AVERAGED = {averaged};\nconst BAND = {};\n", band.is_some());
         if let Some([r, g, b]) = band {
             self.numbers[3] = [r, g, b, 0.0];
         }
-        match s.plane().kind() {
+        match kind {
             Kind::Other(Cutoff::Open | Cutoff::Knife(_)) => {
                 self.text += include_str!("technique/no_cutoff.wgsl");
             }
@@ -97,10 +97,6 @@ impl<'a> TechniqueShader<'a> {
                     SourceImage::Disc { radius_m } => [radius_m as f32, 0.0, 0.0, 0.0],
                     _ => [0.0; 4],
                 };
-                // A point source has no area to average over.
-                if *s.plane().image() == SourceImage::Point {
-                    self.text = self.text.replace("AVERAGED = true", "AVERAGED = false");
-                }
             }
             Kind::Other(Cutoff::Color(c)) => {
                 self.text += include_str!("technique/arctangent.wgsl");
