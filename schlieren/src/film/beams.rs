@@ -110,7 +110,7 @@ pub(crate) fn corner_of_cells(
 ) -> Start {
     let margin = f64::from(exposure.margin_px);
     let [x, y] = column_and_row.map(|i| i as f64 / f64::from(per_side) - margin);
-    Start { position_m: framing.plane_from_pixel(x, y).map(|c| c as f32), tilt_rad: [0.0; 2] }
+    framing.start_at(x, y)
 }
 
 /// Points that sample the source; none when there is a closed form.
@@ -135,11 +135,7 @@ fn corners<const C: usize>(
     cancel: &AtomicBool,
 ) -> Option<Vec<Corner>> {
     let (framing, technique) = (film.framing(), exposure.technique);
-    let start = |i: usize| Start {
-        position_m: framing.plane_from_pixel(position_px(i), y).map(|c| c as f32),
-        tilt_rad: [0.0; 2],
-    };
-    let starts: Vec<Start> = (0..columns).map(start).collect();
+    let starts: Vec<Start> = (0..columns).map(|i| framing.start_at(position_px(i), y)).collect();
     let mut exits = vec![Exit::UNDISTURBED; columns];
     if !trace_unless_cancelled(exposure.paths, &starts, &mut exits, cancel) {
         return None;

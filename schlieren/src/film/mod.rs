@@ -109,15 +109,18 @@ impl Framing {
         ]
     }
 
+    /// The start of an on-axis ray through the point at `x`, `y`, as for
+    /// [`Framing::plane_from_pixel`].
+    pub(crate) fn start_at(&self, x: f64, y: f64) -> Start {
+        let at_m = self.plane_from_pixel(x, y);
+        Start { position_m: at_m.map(|c| c as f32), tilt_rad: [0.0; 2] }
+    }
+
     /// The centres of all pixels as starts of on-axis rays, row by row from the top.
-    pub fn pixel_centers(&self) -> Vec<crate::path::Start> {
-        let center = |i: u32, j: u32| self.plane_from_pixel(f64::from(i) + 0.5, f64::from(j) + 0.5);
+    pub fn pixel_centers(&self) -> Vec<Start> {
         (0..self.height)
             .flat_map(|j| (0..self.width).map(move |i| (i, j)))
-            .map(|(i, j)| crate::path::Start {
-                position_m: center(i, j).map(|c| c as f32),
-                tilt_rad: [0.0; 2],
-            })
+            .map(|(i, j)| self.start_at(f64::from(i) + 0.5, f64::from(j) + 0.5))
             .collect()
     }
 }

@@ -55,9 +55,8 @@ impl Exposure<'_> {
         // as good for the sampler.
         let sampler = Sampler::new(self.sampling, self.seed, x as u32, y as u32, pass);
         let jitter = sampler.square(JITTER);
-        let at = framing
-            .plane_from_pixel(x as f64 + f64::from(jitter[0]), y as f64 + f64::from(jitter[1]));
-        let mut start = Start { position_m: at.map(|c| c as f32), tilt_rad: [0.0; 2] };
+        let mut start =
+            framing.start_at(x as f64 + f64::from(jitter[0]), y as f64 + f64::from(jitter[1]));
         let mut image_point_m = [0.0; 2];
         if self.tilted_beams || self.technique.needs_source_points() {
             let optics = self.technique.optics();

@@ -18,7 +18,7 @@ pub fn corners(framing: &Framing) -> usize {
 pub fn start_of_corner(framing: &Framing, corner: usize) -> Start {
     let columns = framing.width as usize + 1;
     let (x, y) = ((corner % columns) as f64, (corner / columns) as f64);
-    Start { position_m: framing.plane_from_pixel(x, y).map(|c| c as f32), tilt_rad: [0.0; 2] }
+    framing.start_at(x, y)
 }
 
 /// Exposes a film by beams, a cell for each pixel, with the exits of all corners. `None` if there
