@@ -68,7 +68,8 @@ pub fn cells_from_dataset(
     if walls.baffles() > 0 {
         report.warnings.push(format!(
             "{} faces between cells are walls without thickness, which stop light: the file has \
-             their points twice, with a velocity of zero on both sides",
+             their points twice, with a velocity of zero on both sides; where none is, light passes \
+             with another choice than auto for what is outside the mesh (flow.outside)",
             walls.baffles()
         ));
     }
