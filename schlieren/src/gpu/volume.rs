@@ -155,8 +155,8 @@ impl DeviceVolume {
 /// Memory of rows that a driver on the CPU gets at most. They are four times as large as slabs.
 const MOST_ROW_BYTES: u64 = 1 << 30;
 
-/// Width, height and layers of a texture of rows, for a driver on the CPU. Other drivers read
-/// neighbouring numbers of buffers together anyway.
+/// Width, height and layers of a texture of rows, for a driver on the CPU: of the others none
+/// was measured.
 fn rows_size(gpu: &Gpu, coefficients: [usize; 3]) -> Option<[u32; 3]> {
     let [x, y, z] = coefficients;
     let size = [x - 3, y, z].map(|n| u32::try_from(n).unwrap_or(u32::MAX));
