@@ -209,25 +209,27 @@ fn only_pixels_come_back_and_each_part_of_a_frame_is_submitted_once() {
     let margin = 2 * u64::from(out.report.margin_px);
     let photons = (41 + margin) * (30 + margin) * 300;
     assert_eq!(work.photons, photons);
-    // Tiles of 8 x 8 pixels are not all full. The margin was measured with 4,096 rays.
-    let tiles = (41 + margin).div_ceil(8) * (30 + margin).div_ceil(8) * 300;
-    assert_eq!((work.submissions, work.rays), (1 + (64 * tiles).div_ceil(1 << 18), 4096));
+    // Tiles of 16 x 4 pixels are not all full. The margin was measured with 4,096 rays. A fast
+    // device gets larger parts.
+    let tiles = (41 + margin).div_ceil(16) * (30 + margin).div_ceil(4) * 300;
+    let most = 1 + (64 * tiles).div_ceil(1 << 18);
+    assert!((2..=most).contains(&work.submissions) && work.rays == 4096, "{work:?}, {most}");
     // Two films of energies for the noise, and counts; the rays of the margin are 32 bytes each.
     let film = 41 * 30 * (2 * 8 + 4) + 48;
     assert_eq!(work.bytes_from_device, film + 4096 * 32);
-    // A driver on the CPU has four coefficients in each texel.
-    let software = Gpu::shared().unwrap().is_software();
-    let flow = if software { 16 * 16 * 19 * 19 } else { 4 * 19 * 19 * 19 };
+    // Rows of four coefficients, or a GPU in a processor has coefficients alone.
+    let flow = [16 * 16 * 19 * 19, 4 * 19 * 19 * 19];
     let rays = 4096 * 64 + 96;
     let frames = work.submissions - 1;
-    assert_eq!(work.bytes_to_device, flow + rays + 96 + frames * 336, "{work:?}");
+    let others = rays + 96 + frames * 336;
+    assert!(flow.contains(&(work.bytes_to_device - others)), "{work:?}");
 
     // The picture alone is filtered on the device.
     let scene = scene("gpu", "", &rest);
     let section = TestSection::of_fields(&scene, vec![field], None).unwrap();
     let out = render(&scene, &section, Layers::NONE, &Control::default()).unwrap();
     let picture = out.report.device.unwrap();
-    assert_eq!(picture.submissions, work.submissions + 1);
+    assert!((3..=most + 1).contains(&picture.submissions), "{picture:?}, {most}");
     assert_eq!(picture.bytes_from_device, 41 * 30 * 4 + 48 + 4096 * 32);
 }
 

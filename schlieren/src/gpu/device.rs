@@ -2,6 +2,7 @@
 
 use super::GpuError;
 use super::kernel::FIRST_SLAB;
+use super::part_size::PartSize;
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError, mpsc};
@@ -23,6 +24,8 @@ pub struct Gpu {
     /// The first error outside an error scope.
     failure: Arc<OnceLock<String>>,
     pipelines: Mutex<BTreeMap<String, wgpu::ComputePipeline>>,
+    /// How many photons it gets at a time.
+    pub(super) part_size: PartSize,
     /// Whether this device has finished a batch.
     has_finished_batch: AtomicBool,
     /// How often in a row the GPU was reopened before this device.
@@ -89,6 +92,7 @@ impl Gpu {
             storage_buffers: limits.max_storage_buffers_per_shader_stage,
             failure,
             pipelines: Mutex::default(),
+            part_size: PartSize::default(),
             has_finished_batch: AtomicBool::new(false),
             reopened: 0,
             replacement: Mutex::default(),
@@ -183,7 +187,12 @@ impl Gpu {
     /// Whether the driver runs on the CPU. Its results are correct, but it is slower than this
     /// library's CPU kernels.
     pub fn is_software(&self) -> bool {
-        self.info.device_type == DeviceType::Cpu
+        self.device_type() == DeviceType::Cpu
+    }
+
+    /// What kind of adapter it is.
+    pub(super) fn device_type(&self) -> DeviceType {
+        self.info.device_type
     }
 
     /// Whether bindings are smaller than the device allows ([`Gpu::with_binding_limit`]).

@@ -7,6 +7,32 @@ use crate::interpolate::Interpolant;
 /// and kinds of nodes.
 pub(super) const FIRST_SLAB: u32 = 4;
 
+/// How the field lies on the device.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(super) enum FieldLayout {
+    /// Numbers, divided over this many buffers.
+    Slabs(u32),
+    /// Rows of four coefficients in the texels of a texture.
+    RowTexture,
+    /// Rows of four coefficients in a buffer.
+    RowBuffer,
+}
+
+impl FieldLayout {
+    /// Number of bindings.
+    fn bindings(self) -> u32 {
+        match self {
+            FieldLayout::Slabs(count) => count,
+            FieldLayout::RowTexture | FieldLayout::RowBuffer => 1,
+        }
+    }
+
+    /// Number of storage buffers.
+    pub(super) fn buffers(self) -> u32 {
+        if self == FieldLayout::RowTexture { 0 } else { self.bindings() }
+    }
+}
+
 /// The features of a kernel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) struct Kernel {
@@ -16,9 +42,8 @@ pub(super) struct Kernel {
     pub(super) opd: bool,
     /// Whether the field has blank or solid nodes.
     pub(super) nodes: bool,
-    /// Number of buffers over which the field is divided; 0 if it is a texture with a row of four
-    /// coefficients in each texel.
-    pub(super) slabs: u32,
+    /// Rows are of [`Interpolant::BSpline`] only.
+    pub(super) layout: FieldLayout,
 }
 
 impl Kernel {
@@ -47,19 +72,21 @@ impl Kernel {
             "fn node_kind(at: vec3f) -> u32 {\n    return 0u;\n}\n"
         };
         if spline {
+            text += "struct RowSums {\n    value: vec4f,\n    along_z: vec4f,\n}\n\n";
             text += "fn weighted(w: vec4f, v: vec4f) -> f32 {\n    return fma(w.w, v.w, fma(w.z, \
                      v.z, fma(w.y, v.y, w.x * v.x)));\n}\n";
         }
         let source =
             if spline { include_str!("bspline.wgsl") } else { include_str!("trilinear.wgsl") };
-        let (values, origin) = match (self.slabs, spline) {
-            (0, _) => (include_str!("bspline_rows.wgsl"), "vec3u"),
-            (_, true) => (include_str!("bspline_slab.wgsl"), "u32"),
-            (_, false) => {
+        let (values, origin) = match (self.layout, spline) {
+            (FieldLayout::RowTexture, _) => (include_str!("bspline_row_texture.wgsl"), "vec3u"),
+            (FieldLayout::RowBuffer, _) => (include_str!("bspline_row_buffer.wgsl"), "u32"),
+            (FieldLayout::Slabs(_), true) => (include_str!("bspline_slab.wgsl"), "u32"),
+            (FieldLayout::Slabs(_), false) => {
                 ("@group(0) @binding(BINDING) var<storage, read> values_SLAB: array<f32>;\n", "u32")
             }
         };
-        for slab in 0..self.slabs.max(1) {
+        for slab in 0..self.layout.bindings() {
             let binding = (FIRST_SLAB + slab).to_string();
             for part in [values, source] {
                 text += &part
@@ -76,11 +103,12 @@ impl Kernel {
     /// holds the point.
     fn sample(&self) -> String {
         let mut text = "fn sample(at: vec3f) -> vec4f {\n    let p = locate(at);\n".to_string();
-        if self.slabs == 0 {
+        if self.layout == FieldLayout::RowTexture {
             return text + "    return sample_0(p.cell, p.fraction);\n}\n";
         }
         let offset = |z: &str| format!("p.cell.x + p.cell.y * params.row + ({z}) * params.layer");
-        if self.slabs == 1 {
+        let slabs = self.layout.bindings();
+        if slabs == 1 {
             text += &format!("    return sample_0({}, p.fraction);\n}}\n", offset("p.cell.z"));
             return text;
         }
@@ -89,12 +117,12 @@ impl Kernel {
             "    let o = {};\n    switch slab {{\n",
             offset("p.cell.z - slab * params.slab")
         );
-        for slab in 0..self.slabs - 1 {
+        for slab in 0..slabs - 1 {
             text += &format!("        case {slab}u: {{ return sample_{slab}(o, p.fraction); }}\n");
         }
         text += &format!(
             "        default: {{ return sample_{}(o, p.fraction); }}\n    }}\n}}\n",
-            self.slabs - 1
+            slabs - 1
         );
         text
     }
@@ -105,15 +133,24 @@ mod tests {
     use super::*;
     use wgpu::naga;
 
+    const LAYOUTS: [FieldLayout; 5] = [
+        FieldLayout::Slabs(1),
+        FieldLayout::Slabs(2),
+        FieldLayout::Slabs(7),
+        FieldLayout::RowTexture,
+        FieldLayout::RowBuffer,
+    ];
+
     fn all() -> impl Iterator<Item = Kernel> {
         let of = |k: u32| Kernel {
             interpolant: if k & 1 == 0 { Interpolant::BSpline } else { Interpolant::Trilinear },
             opd: k & 2 != 0,
             nodes: k & 4 != 0,
-            slabs: [1, 2, 7, 0][(k >> 3) as usize],
+            layout: LAYOUTS[(k >> 3) as usize],
         };
         // Rows are coefficients.
-        (0..32).map(of).filter(|k| k.slabs > 0 || k.interpolant == Interpolant::BSpline)
+        let are_slabs = |k: &Kernel| matches!(k.layout, FieldLayout::Slabs(_));
+        (0..40).map(of).filter(move |k| are_slabs(k) || k.interpolant == Interpolant::BSpline)
     }
 
     fn parsed(wgsl: &str) -> naga::Module {
@@ -156,7 +193,7 @@ mod tests {
             let module = parsed(&kernel.of_rays());
             let bound =
                 module.global_variables.iter().filter(|(_, v)| v.binding.is_some()).count() as u32;
-            assert_eq!(bound, 3 + u32::from(kernel.nodes) + kernel.slabs.max(1), "{kernel:?}");
+            assert_eq!(bound, 3 + u32::from(kernel.nodes) + kernel.layout.bindings(), "{kernel:?}");
         }
     }
 }

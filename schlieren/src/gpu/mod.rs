@@ -11,7 +11,8 @@
 //! |---|---|
 //! | device.rs | [`Gpu`]: finds an adapter, opens it, knows its limits |
 //! | kernel.rs, *.wgsl | the shader, assembled from what a scene needs |
-//! | volume.rs | the field on the device |
+//! | volume.rs, rows.rs | the field on the device: in slabs, or in rows of four coefficients |
+//! | part_size.rs | how many photons a device gets at a time |
 //! | paths.rs | [`GpuPaths`]: traces starts to exits in batches |
 //! | frame/ | a whole frame on the device: starts, march, cut-off, film |
 //! | cpu_fallback.rs | recovery of batches that the device does not finish, on a reopened device or on the CPU |
@@ -23,7 +24,9 @@ mod cpu_fallback;
 mod device;
 mod frame;
 mod kernel;
+mod part_size;
 mod paths;
+mod rows;
 mod volume;
 mod work;
 

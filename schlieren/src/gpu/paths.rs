@@ -98,7 +98,7 @@ impl DeviceState {
             interpolant,
             opd: options.quantities.opd,
             nodes: volume.kinds.is_some(),
-            slabs: volume.values.slabs() as u32,
+            layout: volume.values.layout(),
         };
         let pipeline = gpu.pipeline(kernel.of_rays(), "march")?;
         Ok(DeviceState { gpu, number, kernel, pipeline, volume, idle: Mutex::default() })
@@ -298,7 +298,7 @@ impl<'a> GpuPaths<'a> {
     /// Number of buffers over which the field is divided; 0 if a driver on the CPU has it as a
     /// texture.
     pub fn slabs(&self) -> usize {
-        self.on_device().volume.values.slabs()
+        self.on_device().volume.values.layout().buffers() as usize
     }
 
     pub(super) fn params(&self, volume: &DeviceVolume, rays: usize) -> Params {

@@ -1,8 +1,8 @@
 //! Copies the field to the device: its nodes or the coefficients of its spline, in slabs of layers
 //! that fit a binding.
 
-use super::kernel::{FIRST_SLAB, Kernel};
-use super::{Gpu, GpuError};
+use super::kernel::{FIRST_SLAB, FieldLayout, Kernel};
+use super::{Gpu, GpuError, rows};
 use crate::field::Field;
 use crate::interpolate::{BSpline, Interpolant};
 use crate::march::FieldCache;
@@ -11,7 +11,7 @@ use wgpu::{BufferDescriptor, BufferUsages};
 
 /// Bytes per upload. A larger upload would be copied to staging memory as a whole before its
 /// transfer begins.
-const UPLOAD_BYTES: usize = 64 << 20;
+pub(super) const UPLOAD_BYTES: usize = 64 << 20;
 
 /// Keeps a field on the device for the next image of it. The owner must pass the same field to
 /// every call.
@@ -59,15 +59,17 @@ pub(super) enum Values {
     /// Slabs along z. Neighbouring slabs share the layers that cells at their border need.
     Slabs(Vec<wgpu::Buffer>),
     /// Coefficients of the spline, a row of four in each texel.
-    Rows(wgpu::TextureView),
+    RowTexture(wgpu::TextureView),
+    /// Coefficients of the spline, a row of four for each.
+    RowBuffer(wgpu::Buffer),
 }
 
 impl Values {
-    /// Number of slabs; 0 for rows.
-    pub(super) fn slabs(&self) -> usize {
+    pub(super) fn layout(&self) -> FieldLayout {
         match self {
-            Values::Slabs(slabs) => slabs.len(),
-            Values::Rows(_) => 0,
+            Values::Slabs(slabs) => FieldLayout::Slabs(slabs.len() as u32),
+            Values::RowTexture(_) => FieldLayout::RowTexture,
+            Values::RowBuffer(_) => FieldLayout::RowBuffer,
         }
     }
 
@@ -78,7 +80,10 @@ impl Values {
                 let resources = slabs.iter().map(wgpu::Buffer::as_entire_binding);
                 (FIRST_SLAB..).zip(resources).collect()
             }
-            Values::Rows(view) => vec![(FIRST_SLAB, wgpu::BindingResource::TextureView(view))],
+            Values::RowTexture(view) => {
+                vec![(FIRST_SLAB, wgpu::BindingResource::TextureView(view))]
+            }
+            Values::RowBuffer(rows) => vec![(FIRST_SLAB, rows.as_entire_binding())],
         }
     }
 }
@@ -127,9 +132,11 @@ impl DeviceVolume {
         }
         let kinds = words.map(|w| upload(gpu, bytemuck::cast_slice(&w))).transpose()?;
         let of_kinds = kinds.as_ref().map_or(0, wgpu::Buffer::size);
-        if let Some(size) = spline.and_then(|_| rows_size(gpu, [nx + 2, ny + 2, nz + 2])) {
-            let values = Values::Rows(upload_rows(gpu, values, size)?);
-            let bytes = of_kinds + 16 * size.iter().map(|n| u64::from(*n)).product::<u64>();
+        if spline.is_some()
+            && let Some(rows) = rows::upload(gpu, values, [nx + 2, ny + 2, nz + 2])?
+        {
+            let (values, stride, of_rows) = rows;
+            let bytes = of_kinds + of_rows;
             return Ok(DeviceVolume { values, kinds, stride, layers: nz - 1, bytes });
         }
         let Some((count, layers)) =
@@ -150,66 +157,6 @@ impl DeviceVolume {
         let bytes = of_kinds + slabs.iter().map(wgpu::Buffer::size).sum::<u64>();
         Ok(DeviceVolume { values: Values::Slabs(slabs), kinds, stride, layers, bytes })
     }
-}
-
-/// Memory of rows that a driver on the CPU gets at most. They are four times as large as slabs.
-const MOST_ROW_BYTES: u64 = 1 << 30;
-
-/// Width, height and layers of a texture of rows, for a driver on the CPU: of the others none
-/// was measured.
-fn rows_size(gpu: &Gpu, coefficients: [usize; 3]) -> Option<[u32; 3]> {
-    let [x, y, z] = coefficients;
-    let size = [x - 3, y, z].map(|n| u32::try_from(n).unwrap_or(u32::MAX));
-    let bytes = 16 * (x as u64 - 3) * y as u64 * z as u64;
-    let limits = gpu.device.limits();
-    let fits = size[0].max(size[1]) <= limits.max_texture_dimension_2d
-        && size[2] <= limits.max_texture_array_layers
-        && bytes <= MOST_ROW_BYTES;
-    (gpu.is_software() && !gpu.has_binding_limit() && fits).then_some(size)
-}
-
-/// Uploads coefficients, four in each texel.
-fn upload_rows(
-    gpu: &Gpu,
-    coefficients: &[f32],
-    [width, height, layers]: [u32; 3],
-) -> Result<wgpu::TextureView, GpuError> {
-    let (columns, rows) = (width as usize + 3, height as usize);
-    gpu.checked(|| {
-        let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("field"),
-            size: wgpu::Extent3d { width, height, depth_or_array_layers: layers },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: wgpu::TextureFormat::Rgba32Float,
-            usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
-            view_formats: &[],
-        });
-        let mut texels = Vec::with_capacity(width as usize * rows);
-        for (z, layer) in (0..layers).zip(coefficients.chunks(columns * rows)) {
-            texels.clear();
-            for row in layer.chunks(columns) {
-                texels.extend(row.windows(4).map(|w| [w[0], w[1], w[2], w[3]]));
-            }
-            let origin = wgpu::Origin3d { x: 0, y: 0, z };
-            gpu.queue.write_texture(
-                wgpu::TexelCopyTextureInfo { origin, ..texture.as_image_copy() },
-                bytemuck::cast_slice(&texels),
-                wgpu::TexelCopyBufferLayout {
-                    offset: 0,
-                    bytes_per_row: Some(16 * width),
-                    rows_per_image: None,
-                },
-                wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
-            );
-        }
-        gpu.queue.submit([]);
-        texture.create_view(&wgpu::TextureViewDescriptor {
-            dimension: Some(wgpu::TextureViewDimension::D2Array),
-            ..Default::default()
-        })
-    })
 }
 
 /// Number of slabs and layers of cells in each, so that every slab fits a binding. The last slab

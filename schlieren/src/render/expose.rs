@@ -1,6 +1,7 @@
 //! Exposes a film to the light of every spectral line through the test section, and filters the
 //! noise.
 
+use super::margin;
 use super::on_gpu::{self, FilmControl};
 use super::paths::Accuracy;
 use super::{
@@ -11,9 +12,10 @@ use crate::film::photons::{ExposedFilm, Exposure, LandedPhoton, expose};
 use crate::film::{Film, Framing, Tally};
 use crate::filter::Filter;
 use crate::optics::{Optics, SourceImage};
-use crate::path::{Exit, LightPaths, PathQuantities, Start};
+use crate::path::PathQuantities;
 use crate::scene::{BeamsSpec, Jitter, SamplingSpec, Scene, TechniqueSpec};
 use crate::spectrum::film_colors;
+use rayon::prelude::*;
 use rt_core::sampler::Sampling;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
@@ -60,7 +62,6 @@ pub(super) fn expose_lines<'a>(
     r.report.effects.tilted_beams = tilted_beams;
     let against_light = matches!(scene.technique, TechniqueSpec::Bos { .. });
     let colors = film_colors(&lines);
-    r.pixels = vec![[0.0; 3]; framing.pixels()];
     r.colored = lines.len() > 1;
     let mut first = None;
 
@@ -79,7 +80,7 @@ pub(super) fn expose_lines<'a>(
         let margin_px = if t.samples_from_film() {
             0
         } else {
-            margin_px(&*planned.paths, &optics, &framing, &mut r.report)
+            margin::margin_px(&planned, scene, section, line, framing, &mut r.report)
         };
         let (sampling, seed) = match scene.sampling() {
             SamplingSpec::Photons { jitter: Jitter::Random, seed, .. } => (Sampling::Random, seed),
@@ -106,13 +107,11 @@ pub(super) fn expose_lines<'a>(
         if t.is_colored() {
             let film = expose_line::<3>(scene, &light, framing, control.cancel, &part, r)?;
             r.colored = true;
-            r.pixels = film.into_iter().map(|p| p.map(|v| v * scale)).collect();
+            r.pixels = film.into_par_iter().map(|p| p.map(|v| v * scale)).collect();
         } else {
             let film = expose_line::<1>(scene, &light, framing, control.cancel, &part, r)?;
             let color = if lines.len() > 1 { colors[line] } else { [1.0; 3] };
-            for (p, f) in r.pixels.iter_mut().zip(film) {
-                (0..3).for_each(|c| p[c] += f[0] * color[c] * scale);
-            }
+            add_line(&mut r.pixels, film, color, scale);
         }
         r.report.add_traced(&*planned.paths);
         if line == 0 {
@@ -129,6 +128,19 @@ pub(super) fn expose_lines<'a>(
         first.get_or_insert(planned);
     }
     Ok(first)
+}
+
+/// Adds the brightness of a line to the pixels, of which there are none before the first.
+fn add_line(pixels: &mut Vec<[f32; 3]>, film: Vec<[f32; 1]>, color: [f32; 3], scale: f32) {
+    let colored = |f: [f32; 1]| color.map(|c| f[0] * c * scale);
+    if pixels.is_empty() {
+        *pixels = film.into_par_iter().map(colored).collect();
+    } else {
+        pixels.par_iter_mut().zip(film).for_each(|(p, f)| {
+            let more = colored(f);
+            (0..3).for_each(|c| p[c] += more[c]);
+        });
+    }
 }
 
 /// The light of one line, and the layers that are wanted of it.
@@ -303,49 +315,4 @@ fn noise<const C: usize>(
         Filter::None | Filter::Cone { .. } => difference,
     };
     difference.iter().map(|d| d.iter().fold(0.0f32, |m, v| m.max(v.abs()))).collect()
-}
-
-/// Width of the margin around the image, in pixels, from which light can be deflected into it. It
-/// is the largest shift found by a coarse lattice of rays over 1.5 times the image's size, plus a
-/// quarter for what the lattice misses.
-fn margin_px(
-    paths: &dyn LightPaths,
-    optics: &Optics,
-    framing: &Framing,
-    report: &mut Report,
-) -> u32 {
-    const PROBES: u32 = 64;
-    let probe = |i: u32, n: u32| {
-        (f64::from(i) + 0.5) / f64::from(PROBES) * 1.5 * f64::from(n) - 0.25 * f64::from(n)
-    };
-    let starts: Vec<Start> = (0..PROBES * PROBES)
-        .map(|k| {
-            let at = framing.plane_from_pixel(
-                probe(k % PROBES, framing.width),
-                probe(k / PROBES, framing.height),
-            );
-            Start { position_m: at.map(|c| c as f32), tilt_rad: [0.0; 2] }
-        })
-        .collect();
-    let mut exits = vec![Exit::UNDISTURBED; starts.len()];
-    paths.trace_parallel(&starts, &mut exits);
-    let lands =
-        |e: &&(&Start, &Exit)| e.1.transmission > 0.0 && e.1.status != crate::path::Status::Turned;
-    let shift_px = |(s, e): (&Start, &Exit)| {
-        let [x, y] = optics.film_shift_m(s, e);
-        f64::from(x.abs().max(y.abs())) / framing.pixel_m
-    };
-    let pairs: Vec<(&Start, &Exit)> = starts.iter().zip(&exits).collect();
-    let farthest = pairs.iter().filter(lands).map(|p| shift_px(*p)).fold(0.0f64, f64::max);
-    let needed_px = (1.25 * farthest + 1.0).ceil();
-    let limit = f64::from(framing.width.max(framing.height));
-    if needed_px > limit {
-        report.warnings.push(format!(
-            "light is displaced by {farthest:.0} pixels, more than the image's size; light from \
-             farther away is ignored. Move the film nearer or enlarge the field of view"
-        ));
-    }
-    let margin = needed_px.min(limit) as u32;
-    report.margin_px = report.margin_px.max(margin);
-    margin
 }

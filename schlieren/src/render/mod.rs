@@ -26,6 +26,7 @@ mod apparent;
 mod device_work;
 mod expose;
 pub(crate) mod map;
+mod margin;
 mod media;
 #[cfg(test)]
 mod media_tests;
@@ -55,6 +56,7 @@ use crate::spectrum::filter_band;
 use crate::technique::volume::ComparisonError;
 use crate::technique::{Technique, bos, interferogram, schlieren, slice, volume};
 use paths::Accuracy;
+use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Errors of rendering.
@@ -346,14 +348,19 @@ pub fn render(
         media::add_map(scene, section, &planned, &mut r)?;
     }
     media::warn(scene, layers, &mut r.report.warnings);
-    r.report.levels = r
-        .pixels
-        .iter()
-        .flatten()
-        .fold([f32::INFINITY, f32::NEG_INFINITY], |[l, h], v| [l.min(*v), h.max(*v)]);
+    r.report.levels = levels(&r.pixels);
     warn_about_image(scene, &mut r.report);
     (control.progress)(1.0);
     Ok(r)
+}
+
+/// Lowest and highest channel value.
+fn levels(pixels: &[Rgb]) -> [f32; 2] {
+    let none = [f32::INFINITY, f32::NEG_INFINITY];
+    let of_part =
+        |part: &[Rgb]| part.iter().flatten().fold(none, |[l, h], v| [l.min(*v), h.max(*v)]);
+    let both = |a: [f32; 2], b: [f32; 2]| [a[0].min(b[0]), a[1].max(b[1])];
+    pixels.par_chunks(1 << 13).map(of_part).reduce(|| none, both)
 }
 
 /// Positions of the pixels: the scene's field of view, or the whole field.

@@ -2,6 +2,7 @@
 //! media.
 
 use super::RenderError;
+use super::margin::ShiftCache;
 use crate::field::Field;
 use crate::gas_on_cells::GasOnCells;
 use crate::input;
@@ -35,12 +36,13 @@ pub struct TestSection {
     pub(super) caches: Vec<Caches>,
 }
 
-/// What marches compute from a field, and what they copy to a device.
+/// What marches compute from a field, what they copy to a device, and how far light is shifted.
 #[derive(Default)]
 pub(super) struct Caches {
     pub(super) field: FieldCache,
     #[cfg(feature = "gpu")]
     pub(super) device: crate::gpu::VolumeCache,
+    pub(super) shift: ShiftCache,
 }
 
 /// Refuses scenes that need a lattice and have none, before anything looks for it.

@@ -1,6 +1,7 @@
 //! The film on the device: its layout, and its way back.
 
 use crate::film::{Film, Framing, Tally};
+use rayon::prelude::*;
 
 /// Outcomes that film.wgsl counts, in its order.
 const OUTCOMES: usize = 6;
@@ -89,7 +90,8 @@ pub(super) fn add_to_films<const C: usize>(layout: FilmLayout, words: &[u32], fi
 /// The picture that came back.
 pub(super) fn picture<const C: usize>(words: &[u32]) -> Vec<[f32; C]> {
     let (pixels, _) = words.split_at(words.len() - 2 * OUTCOMES);
-    pixels.chunks_exact(C).map(|p| std::array::from_fn(|c| f32::from_bits(p[c]))).collect()
+    let pixel = |p: &[u32]| std::array::from_fn(|c| f32::from_bits(p[c]));
+    pixels.par_chunks_exact(C).with_min_len(1 << 13).map(pixel).collect()
 }
 
 /// Counts of outcomes but [`Tally::sent`], and the number of steps: the last of what came back.

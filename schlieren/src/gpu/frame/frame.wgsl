@@ -21,7 +21,7 @@ struct Frame {
     // Photons: first pass of this submission.
     first_pass: u32,
     forward_steps: vec3f,
-    // Photons: tiles of 8 x 8 pixels in a row, and in a pass. Beams: corners in a row, and rows of
+    // Photons: tiles of 16 x 4 pixels in a row, and in a pass. Beams: corners in a row, and rows of
     // cells in this submission.
     per_row: u32,
     forward_steps_low: vec3f,

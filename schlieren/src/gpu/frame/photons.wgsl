@@ -1,5 +1,5 @@
 // Sends photons: one invocation traces one photon and deposits it. A work group has a tile of
-// 8 x 8 pixels in the pass `number`.
+// 16 x 4 pixels in the pass `number`: neighbours along x read the same lines of memory.
 
 fn send(x: i32, y: i32, number: u32, ray: u32) {
     if is_behind_body(ray) {
@@ -50,8 +50,8 @@ fn photons(
     let tile = frame.first + group.x;
     let number = frame.first_pass + tile / frame.per_pass;
     let in_pass = tile % frame.per_pass;
-    let x = in_pass % frame.per_row * 8u + lane % 8u;
-    let y = in_pass / frame.per_row * 8u + lane / 8u;
+    let x = in_pass % frame.per_row * 16u + lane % 16u;
+    let y = in_pass / frame.per_row * 4u + lane / 16u;
     if x < frame.width + 2u * frame.margin && y < frame.height + 2u * frame.margin {
         send(i32(x) - i32(frame.margin), i32(y) - i32(frame.margin), number, 64u * group.x + lane);
     }

@@ -97,6 +97,7 @@ mod tests {
     use super::super::params::FrameParams;
     use super::*;
     use crate::cutoff::{Aperture, ColorWheel, Cutoff, FilterImage, Knife, KnifePosition, Passes};
+    use crate::gpu::kernel::FieldLayout;
     use crate::interpolate::Interpolant;
     use crate::optics::{Optics, SourceShape};
     use crate::technique::{Technique, bos, interferogram, schlieren::Schlieren};
@@ -159,7 +160,7 @@ mod tests {
                         interpolant: Interpolant::BSpline,
                         opd: technique.needs_opd(),
                         nodes: k & 1 != 0,
-                        slabs: 1,
+                        layout: FieldLayout::Slabs(1),
                     },
                     technique: &of_technique,
                     channels: if k & 2 == 0 { 1 } else { 3 },

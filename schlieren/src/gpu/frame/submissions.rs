@@ -5,6 +5,7 @@ use super::params::FrameParams;
 use super::shader::FrameShader;
 use super::{Job, Light};
 use crate::film::beams::corner_of_cells;
+use crate::gpu::part_size::{FEWEST_GROUPS, MOST_GROUPS};
 use crate::gpu::paths::DeviceState;
 use crate::gpu::{Gpu, GpuError, GpuPaths};
 use rayon::prelude::*;
@@ -12,19 +13,18 @@ use std::collections::VecDeque;
 use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
 use wgpu::BufferUsages;
 
-/// Number of photons or corners in a submission: enough to fill any device, and few enough that no
-/// driver assumes that the device hangs.
-const PER_SUBMISSION: usize = 1 << 18;
+/// Number of corners in a submission, and of photons that bodies may stop: enough to fill any
+/// device, and few enough that no driver assumes that the device hangs.
+const PER_SUBMISSION: usize = TILE * FEWEST_GROUPS;
 /// Pixels of a tile, which is a work group.
 const TILE: usize = 64;
-/// Side of a tile.
-const SIDE: u32 = 8;
+/// Columns and rows of a tile.
+const TILE_SIDES: [u32; 2] = [16, 4];
 /// Submissions in flight: one is prepared while the device works on the other.
 const IN_FLIGHT: usize = 2;
-/// Largest number of work groups along an axis.
-const MOST_GROUPS: usize = 65_535;
 
 /// A kernel with what is bound to it.
 type BoundKernel = (wgpu::ComputePipeline, [wgpu::BindGroup; 2]);
@@ -42,8 +42,16 @@ pub(super) struct FrameOnDevice<'a> {
     kernels: Vec<BoundKernel>,
     /// Kernels that make the picture of the film, and the picture.
     picture: Option<(Vec<BoundKernel>, wgpu::Buffer)>,
-    in_flight: VecDeque<(wgpu::SubmissionIndex, u64)>,
+    in_flight: VecDeque<InFlight>,
     progress: &'a (dyn Fn(u64) + Sync),
+}
+
+/// A submission that the device works on.
+struct InFlight {
+    index: wgpu::SubmissionIndex,
+    rays: u64,
+    /// Work groups of a part whose size can be chosen, and when it was submitted.
+    groups: Option<(usize, Instant)>,
 }
 
 impl<'a> FrameOnDevice<'a> {
@@ -173,7 +181,8 @@ impl<'a> FrameOnDevice<'a> {
         passes: Range<u32>,
     ) -> Result<bool, GpuError> {
         let [width, height] = job.area();
-        let (per_row, rows) = (width.div_ceil(SIDE.into()), height.div_ceil(SIDE.into()));
+        let [of_tile, rows_of_tile] = TILE_SIDES.map(u64::from);
+        let (per_row, rows) = (width.div_ceil(of_tile), height.div_ceil(rows_of_tile));
         let per_pass = per_row * rows;
         (self.params.per_row, self.params.per_pass) = (per_row as u32, per_pass as u32);
         self.params.parts = self.layout.films() as u32;
@@ -184,15 +193,18 @@ impl<'a> FrameOnDevice<'a> {
         };
         let mut first = 0;
         while first < tiles {
-            let count = (tiles - first).min((PER_SUBMISSION / TILE) as u64);
+            // The CPU tests the rays of a part against bodies, into a buffer of fixed size.
+            let is_fixed = self.bodies.is_some();
+            let at_once = if is_fixed { FEWEST_GROUPS } else { self.gpu.part_size.groups() };
+            let count = (tiles - first).min(at_once as u64);
             self.params.first = (first % per_pass) as u32;
             self.params.first_pass = passes.start + (first / per_pass) as u32;
             let sent = photons_of(first + count) - photons_of(first);
             if let Some(bodies) = &self.bodies {
                 let place = |tile: u64, lane: u32| {
                     let (in_pass, margin) = (tile % per_pass, i64::from(job.exposure.margin_px));
-                    let x = in_pass % per_row * u64::from(SIDE) + u64::from(lane % SIDE);
-                    let y = in_pass / per_row * u64::from(SIDE) + u64::from(lane / SIDE);
+                    let x = in_pass % per_row * of_tile + u64::from(lane % TILE_SIDES[0]);
+                    let y = in_pass / per_row * rows_of_tile + u64::from(lane / TILE_SIDES[0]);
                     let pass = passes.start + (tile / per_pass) as u32;
                     job.exposure
                         .send(&job.framing, [x as i64 - margin, y as i64 - margin], pass)
@@ -206,6 +218,9 @@ impl<'a> FrameOnDevice<'a> {
             }
             if !self.submit(paths, &[[count as u32, 1]], sent, job.cancel)? {
                 return Ok(false);
+            }
+            if let Some(last) = self.in_flight.back_mut().filter(|_| !is_fixed) {
+                last.groups = Some((count as usize, Instant::now()));
             }
             first += count;
         }
@@ -267,7 +282,7 @@ impl<'a> FrameOnDevice<'a> {
         run(&mut commands, &self.kernels, groups);
         let index = gpu.queue.submit([commands.finish()]);
         paths.work.add_submission(groups.len() as u64);
-        self.in_flight.push_back((index, rays));
+        self.in_flight.push_back(InFlight { index, rays, groups: None });
         Ok(true)
     }
 
@@ -278,9 +293,12 @@ impl<'a> FrameOnDevice<'a> {
     }
 
     fn wait_for_first(&mut self) -> Result<(), GpuError> {
-        if let Some((index, rays)) = self.in_flight.pop_front() {
+        if let Some(InFlight { index, rays, groups }) = self.in_flight.pop_front() {
             self.gpu.wait(index)?;
             self.gpu.mark_batch_finished();
+            if let Some((groups, since)) = groups {
+                self.gpu.part_size.learn(groups, since.elapsed());
+            }
             (self.progress)(rays);
         }
         Ok(())
