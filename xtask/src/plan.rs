@@ -6,7 +6,7 @@
 //! dev profile, whose members are optimised.
 
 use crate::step::{Action, Step};
-use crate::{licences, main_job, package, systems, tools, wheels};
+use crate::{licences, main_job, package, systems, test_programs, tools, wheels};
 
 const fn cargo(args: &'static [&'static str]) -> Action {
     Action::Cargo { args, env: &[] }
@@ -125,9 +125,7 @@ pub(crate) const STEPS: &[Step] = &[
     Step {
         name: "tests",
         tells: "unit and integration tests of all members pass, with the peers that were found",
-        // Not --examples: it would turn examples into test harnesses, and tests need the example
-        // that is a shared library.
-        action: cargo(&["test", "--workspace", "--no-fail-fast", "--lib", "--bins", "--tests"]),
+        action: Action::Call(test_programs::run),
     },
     Step {
         name: "book-and-doc-tests",
