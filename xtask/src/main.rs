@@ -14,6 +14,7 @@ mod package;
 mod peers;
 mod plan;
 mod runner;
+mod side_by_side;
 mod step;
 mod systems;
 mod test_programs;

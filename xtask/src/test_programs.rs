@@ -4,11 +4,11 @@
 //! that two cores were busy for 60 % of the 1,280 s that this took.
 
 use crate::main_job::build_folder;
+use crate::side_by_side;
 use crate::step::{Context, Outcome};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::sync::Mutex;
 use std::time::Instant;
 
 /// What cargo builds. Not --examples: it would turn examples into test harnesses, and tests need
@@ -50,7 +50,7 @@ pub(crate) fn run(context: &Context<'_>) -> Outcome {
     }
     // The last members' tests wait for programs of others and take longest.
     programs.reverse();
-    let at_once = std::thread::available_parallelism().map_or(1, usize::from);
+    let at_once = side_by_side::at_once();
     println!("{} test programs, {at_once} at once", programs.len());
     let libraries = build_folder(context.root, crate::build_folder_named()).join("debug");
     let ended = run_all(&programs, at_once, |program| {
@@ -81,46 +81,33 @@ fn library_path(libraries: &Path) -> std::ffi::OsString {
     std::env::join_paths(all).unwrap_or_default()
 }
 
-/// Runs programs, so many at once, each in its turn. What one prints comes in one piece.
+/// Runs programs, so many at once. What one prints comes in one piece.
 fn run_all(
     programs: &[Program],
     at_once: usize,
     command: impl Fn(&Program) -> Command + Sync,
 ) -> Vec<Ended> {
-    let (next, ended) = (Mutex::new(programs.iter()), Mutex::new(Vec::new()));
-    std::thread::scope(|scope| {
-        for _ in 0..at_once.max(1) {
-            scope.spawn(|| {
-                loop {
-                    let Some(program) = next.lock().expect("no thread panics").next() else {
-                        return;
-                    };
-                    let begun = Instant::now();
-                    let output = command(program).stdin(Stdio::null()).output();
-                    let secs = begun.elapsed().as_secs_f64();
-                    let name = name(program);
-                    let mut ended = ended.lock().expect("no thread panics");
-                    let mut out = std::io::stdout().lock();
-                    let passed = match output {
-                        Ok(output) => {
-                            let how = output.status;
-                            let _ = writeln!(out, "\n{name}: {how}, {secs:.1} s");
-                            let _ = out.write_all(&output.stdout);
-                            let _ = out.write_all(&output.stderr);
-                            how.success()
-                        }
-                        Err(e) => {
-                            let _ = writeln!(out, "\n{name} does not start: {e}");
-                            false
-                        }
-                    };
-                    let _ = out.flush();
-                    ended.push(Ended { name, passed, secs });
-                }
-            });
-        }
-    });
-    ended.into_inner().expect("no thread panics")
+    side_by_side::each(programs, at_once, |program| {
+        let begun = Instant::now();
+        let output = command(program).stdin(Stdio::null()).output();
+        let secs = begun.elapsed().as_secs_f64();
+        let name = name(program);
+        let mut out = std::io::stdout().lock();
+        let passed = match output {
+            Ok(output) => {
+                let _ = writeln!(out, "\n{name}: {}, {secs:.1} s", output.status);
+                let _ = out.write_all(&output.stdout);
+                let _ = out.write_all(&output.stderr);
+                output.status.success()
+            }
+            Err(e) => {
+                let _ = writeln!(out, "\n{name} does not start: {e}");
+                false
+            }
+        };
+        let _ = out.flush();
+        Ended { name, passed, secs }
+    })
 }
 
 /// The member and the program, as in `rt-core hard_cases`.
@@ -205,9 +192,8 @@ mod tests {
             shell.args(["-c", script]);
             shell
         });
-        let mut failed: Vec<&str> =
+        let failed: Vec<&str> =
             ended.iter().filter(|e| !e.passed).map(|e| e.name.as_str()).collect();
-        failed.sort_unstable();
         assert_eq!((ended.len(), failed), (4, vec!["a bad", "a gone"]));
     }
 }

@@ -12,6 +12,7 @@ use std::process::Command;
 
 use crate::command::first_line_of;
 use crate::main_job;
+use crate::side_by_side;
 use crate::step::{Context, Outcome};
 
 mod make;
@@ -119,8 +120,9 @@ pub(crate) fn run(root: &Path, build: &Path, options: &WheelsOptions) -> Result<
             program.map(|program| (reference.variable, program))
         });
         let reference = reference.transpose()?;
-        for (number, (python, version)) in found.iter().enumerate() {
-            println!("\n{}, {version}: {python}", package.name);
+        let numbered: Vec<_> = found.iter().enumerate().collect();
+        let tested = side_by_side::each(&numbered, side_by_side::at_once(), |item| {
+            let (number, (python, version)) = *item;
             let beside = match number {
                 0 => package.adapted,
                 _ => package.others[(number - 1) % package.others.len()],
@@ -131,13 +133,17 @@ pub(crate) fn run(root: &Path, build: &Path, options: &WheelsOptions) -> Result<
                 name => work.join(format!("{name} {version}").replace(' ', "-")),
             };
             let venv = environment(&venv, python)?;
-            test(package, root, &wheel, reference.as_ref(), &venv, beside)?;
-        }
+            let said = test(package, root, &wheel, reference.as_ref(), &venv, beside)?;
+            println!("\n{}, {version}: {python}\n{said}", package.name);
+            Ok::<_, String>(())
+        });
+        tested.into_iter().collect::<Result<Vec<()>, String>>()?;
     }
     Ok(())
 }
 
-/// Installs the wheel in a fresh environment and runs the package's tests there.
+/// Installs the wheel in a fresh environment and runs the package's tests there. Returns what they
+/// print.
 fn test(
     package: &Package,
     root: &Path,
@@ -145,7 +151,7 @@ fn test(
     reference: Option<&(&str, PathBuf)>,
     venv: &Path,
     beside: &[&str],
-) -> Result<(), String> {
+) -> Result<String, String> {
     let file = wheel.display().to_string();
     let program = venv.join("bin/python");
     if package.alone_with.is_empty() {
@@ -153,7 +159,7 @@ fn test(
     } else {
         pip(venv, &[&file])?;
         let alone = [&["-c", ALONE, package.name], package.alone_with].concat();
-        run_it(Command::new(&program).args(alone))?;
+        output_of(Command::new(&program).args(alone))?;
         pip(venv, &[&["pytest"], beside].concat())?;
     }
     let mut tests = Command::new(&program);
@@ -161,7 +167,7 @@ fn test(
     // Not in the package's folder, whose Python files have no native module beside them.
     let folder = root.join(package.folder).join("tests");
     tests.envs(reference.map(|(variable, program)| (variable, program)));
-    run_it(tests.current_dir(folder))
+    output_of(tests.current_dir(folder))
 }
 
 /// The interpreters of this machine that the wheel is for, one of each version.
@@ -218,12 +224,26 @@ fn reference_program(
     profile: &str,
 ) -> Result<PathBuf, String> {
     let mut cargo = cargo();
-    // All members' features, as `build-tests` has them: with others, all would be built again.
-    cargo.args(["build", "--workspace", "--profile", profile]);
-    run_it(cargo.args(reference.target).current_dir(root))?;
+    if profile == "dev" {
+        // What `build-tests` has built. A single target of it has other features of some packages,
+        // and rt-core would be compiled once more.
+        cargo.args(["test", "--workspace", "--no-run", "--quiet"]);
+    } else {
+        cargo.args(["build", "--workspace", "--profile", profile]).args(reference.target);
+    }
+    run_it(cargo.current_dir(root))?;
     // The profile `dev` builds in `debug`.
     let folder = build.join(if profile == "dev" { "debug" } else { profile });
     absolute(&folder.join(reference.path))
+}
+
+/// What a command that has to succeed prints. Where it fails this is in the error.
+fn output_of(command: &mut Command) -> Result<String, String> {
+    let name = format!("{command:?}").chars().take(200).collect::<String>();
+    let output = command.output().map_err(|e| format!("{name}: {e}"))?;
+    let said = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    let all = said(&output.stdout) + &said(&output.stderr);
+    if output.status.success() { Ok(all) } else { Err(format!("{all}\n{name}: {}", output.status)) }
 }
 
 /// Runs a command that has to succeed.
