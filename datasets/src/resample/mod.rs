@@ -39,7 +39,7 @@ pub use walls::Walls;
 
 use crate::model::ModelError;
 use glam::DVec3;
-use reconstruct::PointField;
+use reconstruct::{PointField, Symmetry};
 
 /// Why a data set cannot be resampled.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -284,6 +284,17 @@ pub fn resample(
     lattice: &Lattice,
     options: &Options,
 ) -> Result<ResampledField, ResampleError> {
+    resample_with(mesh, samples, lattice, options, Symmetry::None)
+}
+
+/// [`resample`], also of half a plane of an axisymmetric flow.
+fn resample_with(
+    mesh: &Mesh,
+    samples: Samples<'_>,
+    lattice: &Lattice,
+    options: &Options,
+    symmetry: Symmetry,
+) -> Result<ResampledField, ResampleError> {
     if !(1..=MAX_SAMPLES).contains(&options.samples_per_axis) {
         return Err(ResampleError::Option {
             option: "samples per axis",
@@ -302,8 +313,8 @@ pub fn resample(
     };
     let field = match (options.reconstruction, cells) {
         (Reconstruction::Linear, _) => PointField::linear(points),
-        (Reconstruction::Cubic, None) => PointField::of_points(mesh, points),
-        (Reconstruction::Cubic, Some(cells)) => PointField::of_cells(mesh, cells, points),
+        (Reconstruction::Cubic, None) => PointField::of_points(mesh, points, symmetry),
+        (Reconstruction::Cubic, Some(cells)) => PointField::of_cells(mesh, cells, points, symmetry),
     };
     let rasterize::Nodes { values, truncation, marks, counts } =
         rasterize::rasterize(mesh, &field, cells, lattice, options.samples_per_axis);

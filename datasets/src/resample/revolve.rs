@@ -5,8 +5,9 @@
 //! gradient steps at the samples of the image.
 
 use super::mesh::Mesh;
+use super::reconstruct::Symmetry;
 use super::report::{self, Report};
-use super::{Lattice, Mark, Options, ResampleError, ResampledField, Samples, resample};
+use super::{Lattice, Mark, Options, ResampleError, ResampledField, Samples, resample_with};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -51,7 +52,7 @@ pub fn revolve(
     spacing.z *= 0.5;
     let image =
         Lattice { dims, origin: DVec3::new(low.x, low.y, low.z + 0.5 * spacing.z), spacing };
-    let flat = resample(mesh, samples, &image, options)?;
+    let flat = resample_with(mesh, samples, &image, options, Symmetry::Axis)?;
 
     // Each node reads the image at its radius.
     let r_low = if low.y <= AXIS_GAP * high.y { low.y } else { 0.0 };

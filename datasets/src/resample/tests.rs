@@ -425,6 +425,37 @@ fn revolved_planes_are_round() {
     assert!(revolved_bounds(&below).unwrap_err().to_string().contains("radii from 0 on"));
 }
 
+/// The cells of an axisymmetric solver are rings: their outer parts weigh more in averages. Beyond
+/// the axis the flow goes on.
+#[test]
+fn averages_over_rings_give_the_flow_on_the_axis() {
+    let (n, sigma) = (20, 3.0);
+    let bell = |r: f64| (-0.5 * (r / sigma).powi(2)).exp();
+    let plane = ImageData::new([11, n + 1, 1], DVec3::ZERO, DVec3::ONE);
+    let mesh = Mesh::with_plane(&Dataset::ImageData(plane), Plane::Extrude { span: 1e-4 }).unwrap();
+    // The integral of r exp(-r^2 / 2 s^2) is -s^2 exp(-r^2 / 2 s^2).
+    let average = |r: f64| {
+        let (a, b) = (r - 0.5, r + 0.5);
+        2.0 * sigma * sigma * (bell(a) - bell(b)) / (b * b - a * a)
+    };
+    let values: Vec<f64> = (0..mesh.num_cells()).map(|c| average(mesh.cell_centre(c).y)).collect();
+    let (low, high) = revolved_bounds(&mesh).unwrap();
+    let lattice = Lattice::fit(low, high, 1.0, Resolution::Spacing(0.5)).unwrap();
+    let r = revolve(&mesh, Samples::Cells(&values), &lattice, &Options::default()).unwrap();
+    let (mut on_axis, mut worst) = (0.0f64, 0.0f64);
+    for (i, v) in r.values.iter().enumerate() {
+        let [nx, ny, _] = lattice.dims;
+        let p = lattice.node(i % nx, i / nx % ny, i / nx / ny);
+        let radius = p.y.hypot(p.z);
+        if radius < 12.0 && (p.x - 5.0).abs() < 3.0 {
+            let error = (f64::from(*v) - bell(radius)).abs();
+            worst = worst.max(error);
+            on_axis = if radius < 1.5 { on_axis.max(error) } else { on_axis };
+        }
+    }
+    assert!(on_axis < 2e-3 && worst < 3e-3, "{on_axis:e} on the axis, {worst:e}");
+}
+
 #[test]
 fn the_depth_of_a_plane_says_nothing_of_the_size_of_its_cells() {
     let points = (0..121).map(|i| [0.1 * f64::from(i % 11), 0.1 * f64::from(i / 11), 0.0]);

@@ -31,7 +31,7 @@ mod walker;
 pub use walker::{Beyond, CellWalker, Entry};
 
 use super::mesh::{Corners, Mesh, Neighbours, Topology};
-use super::reconstruct::{Expansion, FitQuality, PointField, Reconstruction};
+use super::reconstruct::{Expansion, FitQuality, PointField, Reconstruction, Symmetry};
 use super::shape::{self, Shares};
 use super::walls::Walls;
 use super::{ResampleError, Samples};
@@ -182,8 +182,10 @@ impl CellField {
         };
         let field = match (reconstruction, of_cells) {
             (Reconstruction::Linear, _) => PointField::linear(values),
-            (Reconstruction::Cubic, None) => PointField::of_points(&mesh, values),
-            (Reconstruction::Cubic, Some(cells)) => PointField::of_cells(&mesh, cells, values),
+            (Reconstruction::Cubic, None) => PointField::of_points(&mesh, values, Symmetry::None),
+            (Reconstruction::Cubic, Some(cells)) => {
+                PointField::of_cells(&mesh, cells, values, Symmetry::None)
+            }
         };
         let fit = field.quality(&mesh);
         let (expansions, shares) = field.into_parts();

@@ -1,5 +1,6 @@
 //! Centres and second moments of cells, which averages over cells depend on.
 
+use super::Symmetry;
 use crate::resample::mesh::{Corners, Mesh};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -20,9 +21,11 @@ pub(super) struct Moments {
 const NO_VOLUME: Moments = Moments { centre: DVec3::NAN, second: [0.0; 6] };
 
 impl CellMoments {
-    pub(super) fn of(mesh: &Mesh) -> CellMoments {
-        let moments = |cell: usize| {
-            if mesh.is_hidden(cell) { NO_VOLUME } else { of_cell(mesh, &mesh.corners(cell)) }
+    pub(super) fn of(mesh: &Mesh, symmetry: Symmetry) -> CellMoments {
+        let moments = |cell: usize| match (mesh.is_hidden(cell), symmetry) {
+            (true, _) => NO_VOLUME,
+            (false, Symmetry::None) => of_cell(mesh, &mesh.corners(cell)),
+            (false, Symmetry::Axis) => of_cell(mesh, &mesh.corners(cell)).of_ring(),
         };
         CellMoments { cells: (0..mesh.num_cells()).into_par_iter().map(moments).collect() }
     }
@@ -33,6 +36,21 @@ impl CellMoments {
 
     pub(super) fn get(&self, cell: usize) -> Moments {
         self.cells[cell]
+    }
+}
+
+impl Moments {
+    /// Those of the ring that the cell sweeps about the axis y = 0, with the radius as the weight
+    /// of each place. Exact for cells with a centre of symmetry.
+    fn of_ring(self) -> Moments {
+        let Moments { centre, mut second } = self;
+        let [_, xy, _, yy, yz, _] = second;
+        let step = DVec3::new(xy, yy, yz) / centre.y;
+        if centre.y <= 0.0 || !step.is_finite() {
+            return self;
+        }
+        add_products(&mut second, step, -1.0);
+        Moments { centre: centre + step, second }
     }
 }
 
@@ -85,7 +103,7 @@ mod tests {
         let far = DVec3::new(1e5, -2e5, 3e5);
         let image = ImageData::new([2, 2, 3], far, DVec3::new(1.0, 0.5, 2.0));
         let mesh = Mesh::new(&Dataset::ImageData(image)).unwrap();
-        let moments = CellMoments::of(&mesh);
+        let moments = CellMoments::of(&mesh, Symmetry::None);
         let Moments { centre, second } = moments.get(1);
         assert!((centre - far - DVec3::new(0.5, 0.25, 3.0)).length() < 1e-9, "{centre}");
         let want = [1.0 / 12.0, 0.0, 0.0, 0.25 / 12.0, 0.0, 4.0 / 12.0];

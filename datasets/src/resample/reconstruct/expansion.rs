@@ -1,6 +1,8 @@
 //! The polynomial around a point of a mesh.
 
+use super::Symmetry;
 use super::cell_moments::CellMoments;
+use super::counts::Counts;
 use super::least_squares::NormalEquations;
 use super::neighbours::Neighbourhood;
 use super::polynomial::{TERMS, TERMS_TO_DEGREE, means, monomials};
@@ -8,11 +10,6 @@ use crate::resample::mesh::Mesh;
 use glam::DVec3;
 use std::ops::Range;
 
-/// Number of the nearest values that a polynomial is fitted to, two for each unknown. (With 32, a
-/// power hangs on one value in some cells; with 56, nothing gains.)
-const NEAREST: usize = 40;
-/// As many when these leave a power undetermined, as at borders.
-const MORE: usize = 120;
 /// Equations for each unknown, at least.
 const EQUATIONS_PER_TERM: f64 = 1.25;
 
@@ -35,11 +32,6 @@ const QUADRATIC_SHARE: f64 = 0.7;
 /// cells wide on hexahedra, which says nothing any more.
 const UNRESOLVED: f64 = 1.75;
 
-/// Number of samples of a spline: on a cubic grid, those that share a cell.
-const ADJACENT: usize = 26;
-/// The nearest of them, as on a cubic grid. The spline gives each a quarter of the point's own
-/// weight.
-const NEXT: usize = 6;
 /// Number of coefficients of a polynomial of second degree.
 const SPLINE: usize = 1 + TERMS_TO_DEGREE[2];
 
@@ -249,8 +241,10 @@ impl Fit {
         values: &[f64],
         point: usize,
         around: &Neighbourhood,
+        symmetry: Symmetry,
     ) -> Expansion {
         let (value, place) = (values[point], mesh.point(point));
+        let radius = (symmetry == Symmetry::Axis).then_some(place.y);
         if !(value.is_finite() && place.is_finite()) {
             return Expansion::nothing(State::NoValue);
         }
@@ -258,12 +252,9 @@ impl Fit {
         let Some(frame) = frame_of(around.spread(distance, |_| [0.0; 6])) else {
             return Expansion::nothing(State::FewNeighbours);
         };
-        self.samples.clear();
-        self.samples.extend(around.ids.iter().map(|&id| {
-            let place = in_frame(&frame, distance(id));
-            let value = values[id as usize] - value;
-            Sample { square: place.length_squared(), id, value, place, second: [0.0; 6] }
-        }));
+        self.take(&around.ids, &frame, radius, |id| {
+            (distance(id), [0.0; 6], values[id as usize] - value)
+        });
         self.fit(frame, rounding(value), false)
     }
 
@@ -277,8 +268,10 @@ impl Fit {
         value: f64,
         point: usize,
         around: &Neighbourhood,
+        symmetry: Symmetry,
     ) -> Expansion {
         let place = mesh.point(point);
+        let radius = (symmetry == Symmetry::Axis).then_some(place.y);
         if !(value.is_finite() && place.is_finite()) {
             return Expansion::nothing(State::NoValue);
         }
@@ -288,14 +281,44 @@ impl Fit {
         let Some(frame) = frame_of(around.spread(distance, own)) else {
             return Expansion::nothing(State::FewNeighbours);
         };
-        self.samples.clear();
-        self.samples.extend(around.ids.iter().map(|&id| {
-            let place = in_frame(&frame, distance(id));
-            let second = moments_in_frame(&frame, moments.get(id as usize).second);
-            let value = cells[id as usize] - value;
-            Sample { square: place.length_squared(), id, value, place, second }
-        }));
+        self.take(&around.ids, &frame, radius, |id| {
+            (distance(id), own(id), cells[id as usize] - value)
+        });
         self.fit(frame, rounding(value), true)
+    }
+
+    /// Takes the samples of `ids`, each with its distance from the point, its second moments and
+    /// its value. In an axisymmetric flow, the value is there on the other side of the axis too:
+    /// reflected samples are added where they are no farther than the others. `radius` is that of
+    /// the point.
+    fn take(
+        &mut self,
+        ids: &[u32],
+        frame: &[f32; 6],
+        radius: Option<f64>,
+        of: impl Fn(u32) -> (DVec3, [f64; 6], f64),
+    ) {
+        let sample = |id: u32, distance: DVec3, second: [f64; 6], value: f64| {
+            let place = in_frame(frame, distance);
+            let second = moments_in_frame(frame, second);
+            Sample { square: place.length_squared(), id, value, place, second }
+        };
+        self.samples.clear();
+        self.samples.extend(ids.iter().map(|&id| {
+            let (distance, second, value) = of(id);
+            sample(id, distance, second, value)
+        }));
+        let Some(radius) = radius else { return };
+        let farthest = self.samples.iter().map(|s| s.square).fold(0.0, f64::max);
+        for &id in ids {
+            let (distance, [xx, xy, xz, yy, yz, zz], value) = of(id);
+            let to_axis = radius + distance.y;
+            let distance = distance - 2.0 * to_axis * DVec3::Y;
+            let reflected = sample(id, distance, [xx, -xy, xz, yy, -yz, zz], value);
+            if to_axis > 0.0 && reflected.square <= farthest {
+                self.samples.push(reflected);
+            }
+        }
     }
 
     /// Fits to the samples.
@@ -304,13 +327,14 @@ impl Fit {
         self.samples.retain(|s| finite(s) && (s.square > 0.0 || free));
         // The number breaks ties, so that the order does not depend on how they were found.
         self.samples.sort_unstable_by(|a, b| a.square.total_cmp(&b.square).then(a.id.cmp(&b.id)));
-        let around = within(&self.samples, NEAREST).iter();
+        let counts = Counts::of(self.samples.iter().map(|s| s.place), free);
+        let around = within(&self.samples, counts.nearest).iter();
         let (low, high) =
             around.fold((0.0f64, 0.0f64), |(l, h), s| (l.min(s.value), h.max(s.value)));
         let mut best = None;
-        for wanted in [NEAREST, MORE] {
+        for wanted in [counts.nearest, counts.more] {
             let samples = within(&self.samples, wanted);
-            let solution = Solution::of(samples, rounding, free);
+            let solution = Solution::of(samples, counts, rounding, free);
             let complete = solution.as_ref().is_some_and(|s| s.complete);
             best = solution.or(best);
             if complete || samples.len() == self.samples.len() {
@@ -321,7 +345,7 @@ impl Fit {
         let share = share_of(solution.residual);
         let mut coefficients = solution.coefficients.map(|c| share * c);
         if share < 1.0 {
-            let mut spline = spline_at(within(&self.samples, ADJACENT), free);
+            let mut spline = spline_at(&self.samples, counts, free);
             // It goes through the point's value. With the spline's own, or half-way, a shock that
             // crosses long cells is smoother, but bells of four cells lose 9 % of their height.
             if !free {
@@ -354,8 +378,9 @@ impl Fit {
 /// kinks. On a grid they are those of polynomials of first and second degree that are fitted with
 /// the spline's weights: 4 : 1 along an axis, and products of these across. A point that is not
 /// `free` has a value too, zero.
-fn spline_at(samples: &[Sample], free: bool) -> [f64; SPLINE] {
-    let next = within(samples, NEXT);
+fn spline_at(samples: &[Sample], counts: Counts, free: bool) -> [f64; SPLINE] {
+    let samples = within(samples, counts.adjacent);
+    let next = within(samples, counts.next);
     let square = next.iter().map(|s| s.square).sum::<f64>() / next.len() as f64;
     let mut equations = NormalEquations::<SPLINE>::EMPTY;
     let mut row = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
@@ -406,10 +431,10 @@ struct Solution {
 
 impl Solution {
     /// `None` with too few samples for a gradient. A polynomial that is not `free` has no constant.
-    fn of(samples: &[Sample], rounding: f64, free: bool) -> Option<Solution> {
+    fn of(samples: &[Sample], counts: Counts, rounding: f64, free: bool) -> Option<Solution> {
         let constant = usize::from(free);
         let enough = |d: &usize| {
-            samples.len() as f64 >= EQUATIONS_PER_TERM * (TERMS_TO_DEGREE[*d] + constant) as f64
+            samples.len() as f64 >= EQUATIONS_PER_TERM * (counts.terms[*d] + constant) as f64
         };
         let degree = (1..=3).rev().find(enough)?;
         // The constant is the first unknown; without it, its column is zero and is left out.
@@ -433,28 +458,28 @@ impl Solution {
             weights += judged(s);
             mean += judged(s) * s.value;
         }
-        let coefficients = equations.solve(used);
-        let known = coefficients[1..used].iter().filter(|c| **c != 0.0).count();
+        let (coefficients, known) = equations.solve_and_count(used);
         // The variation is that about the point's value, or about the mean of the averages.
         let centre = if free { mean / weights } else { 0.0 };
         let variation: f64 = samples.iter().map(|s| judged(s) * (s.value - centre).powi(2)).sum();
-        let residual_of = |coefficients: &[f64; TERMS + 1]| {
-            let known = coefficients[1..].iter().filter(|c| **c != 0.0).count();
+        let residual_of = |(coefficients, known): ([f64; TERMS + 1], usize)| {
             let fitted =
                 |s: &Sample| coefficients.iter().zip(row(s)).map(|(c, m)| c * m).sum::<f64>();
             let squares: f64 =
                 samples.iter().map(|s| judged(s) * (fitted(s) - s.value).powi(2)).sum();
+            let known = known.saturating_sub(constant);
             let surplus = (samples.len() - known.min(samples.len() - 1)) as f64;
             let above_rounding =
                 squares * samples.len() as f64 / surplus - weights * rounding * rounding;
             if above_rounding > 0.0 { (above_rounding / variation).sqrt() } else { 0.0 }
         };
-        let mut residual = residual_of(&coefficients);
+        let mut residual = residual_of((coefficients, known));
         if degree == 3 {
-            let quadratic = equations.solve(1 + TERMS_TO_DEGREE[2]);
-            residual = residual.max(QUADRATIC_SHARE * residual_of(&quadratic));
+            let quadratic = equations.solve_and_count(1 + TERMS_TO_DEGREE[2]);
+            residual = residual.max(QUADRATIC_SHARE * residual_of(quadratic));
         }
-        Some(Solution { coefficients, degree, residual, complete: known == TERMS })
+        let complete = known == counts.terms[3] + constant;
+        Some(Solution { coefficients, degree, residual, complete })
     }
 }
 
@@ -484,7 +509,10 @@ mod tests {
             })
             .collect();
         samples.sort_by(|a, b| a.square.total_cmp(&b.square));
-        Solution::of(within(&samples, NEAREST), 0.0, false).expect("enough samples").residual
+        let counts = Counts::of(samples.iter().map(|s| s.place), false);
+        assert_eq!(counts.terms, TERMS_TO_DEGREE);
+        let nearest = within(&samples, counts.nearest);
+        Solution::of(nearest, counts, 0.0, false).expect("enough samples").residual
     }
 
     #[test]

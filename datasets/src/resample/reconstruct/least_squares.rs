@@ -32,6 +32,11 @@ impl<const N: usize> NormalEquations<N> {
 
     /// The first `used` unknowns; the others are zero.
     pub(super) fn solve(&self, used: usize) -> [f64; N] {
+        self.solve_and_count(used).0
+    }
+
+    /// [`NormalEquations::solve`], and how many of the unknowns the equations determine.
+    pub(super) fn solve_and_count(&self, used: usize) -> ([f64; N], usize) {
         let used = used.min(N);
         let mut factor = [[0.0; N]; N];
         let mut y = [0.0; N];
@@ -59,7 +64,7 @@ impl<const N: usize> NormalEquations<N> {
             let inner: f64 = (i + 1..used).map(|k| factor[k][i] * x[k]).sum();
             x[i] = (y[i] - inner) / factor[i][i];
         }
-        x
+        (x, kept.iter().filter(|k| **k).count())
     }
 }
 
@@ -80,6 +85,7 @@ mod tests {
         for (got, want) in x.iter().zip([3.0, -0.5, 0.0, 0.25]) {
             assert!((got - want).abs() < 1e-12, "{x:?}");
         }
+        assert_eq!(equations.solve_and_count(4).1, 3);
         assert_eq!(equations.solve(1)[1..], [0.0; 3]);
         assert_eq!(NormalEquations::<4>::EMPTY.solve(4), [0.0; 4]);
     }

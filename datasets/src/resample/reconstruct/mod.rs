@@ -18,6 +18,7 @@
 //! cells: the averages of the polynomials are fitted to them ([`cell_moments`]).
 
 mod cell_moments;
+mod counts;
 mod expansion;
 mod least_squares;
 mod neighbours;
@@ -59,6 +60,14 @@ impl Reconstruction {
     }
 }
 
+/// Whether a mesh is half a plane of an axisymmetric flow.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Symmetry {
+    None,
+    /// The axis is y = 0, and y is the radius. Cells are rings.
+    Axis,
+}
+
 /// Values everywhere in a mesh.
 pub(super) struct PointField<'a> {
     values: &'a [f64],
@@ -92,23 +101,28 @@ impl<'a> PointField<'a> {
     }
 
     /// Fits polynomials to values at points.
-    pub(super) fn of_points(mesh: &Mesh, values: &'a [f64]) -> PointField<'a> {
+    pub(super) fn of_points(mesh: &Mesh, values: &'a [f64], symmetry: Symmetry) -> PointField<'a> {
         let incidence = Incidence::of(mesh);
         let fit = |point: usize, around: &mut Neighbourhood, fit: &mut Fit| {
             around.points(mesh, &incidence, point);
-            fit.over_points(mesh, values, point, around)
+            fit.over_points(mesh, values, point, around, symmetry)
         };
         PointField { values, expansions: fitted(mesh, fit), hexahedra: only_hexahedra(mesh) }
     }
 
     /// Fits polynomials to averages over cells. `values` are the means at the points, which remain
     /// where no polynomial fits.
-    pub(super) fn of_cells(mesh: &Mesh, cells: &[f64], values: &'a [f64]) -> PointField<'a> {
+    pub(super) fn of_cells(
+        mesh: &Mesh,
+        cells: &[f64],
+        values: &'a [f64],
+        symmetry: Symmetry,
+    ) -> PointField<'a> {
         let incidence = Incidence::of(mesh);
-        let moments = CellMoments::of(mesh);
+        let moments = CellMoments::of(mesh, symmetry);
         let fit = |point: usize, around: &mut Neighbourhood, fit: &mut Fit| {
             around.cells(mesh, &incidence, &moments, point);
-            fit.over_cells(mesh, cells, &moments, values[point], point, around)
+            fit.over_cells(mesh, cells, &moments, values[point], point, around, symmetry)
         };
         PointField { values, expansions: fitted(mesh, fit), hexahedra: only_hexahedra(mesh) }
     }

@@ -1,6 +1,8 @@
 use super::super::{Lattice, Mark, Mesh, Options, Reconstruction, Resolution, Samples, resample};
+use super::{PointField, Symmetry};
 use crate::model::{
-    Attributes, Block, Cells, Dataset, Points, RectilinearGrid, StructuredGrid, UnstructuredGrid,
+    Attributes, Block, Cells, Dataset, ImageData, Points, RectilinearGrid, StructuredGrid,
+    UnstructuredGrid,
 };
 use glam::DVec3;
 
@@ -321,4 +323,66 @@ fn truncation_is_nothing_for_quadratic_fields_and_above_the_error_of_a_bell() {
     let at_step = largest(&on(step, Reconstruction::Cubic).truncation);
     assert!(at_step > 0.05, "{at_step}");
     assert!(on(step, Reconstruction::Linear).truncation.is_empty());
+}
+
+/// A lattice of so many cells of size 1.
+fn unit_cells(cells: [usize; 3]) -> Mesh {
+    let dims = cells.map(|n| n as u32 + 1);
+    Mesh::new(&Dataset::ImageData(ImageData::new(dims, DVec3::ZERO, DVec3::ONE))).unwrap()
+}
+
+/// Largest error of gradients along y of a Gaussian across a mesh of cells with its averages, by
+/// the largest gradient.
+fn error_of_a_bell(cells: [usize; 3], sigma: f64) -> f64 {
+    let mesh = unit_cells(cells);
+    let middle = 0.5 * cells[1] as f64 + 0.3;
+    let bell = |y: f64| (-0.5 * ((y - middle) / sigma).powi(2)).exp();
+    // Gauss's three points are exact to the fifth power.
+    let average = |y: f64| {
+        let d = 0.6f64.sqrt() / 2.0;
+        (5.0 * bell(y - d) + 8.0 * bell(y) + 5.0 * bell(y + d)) / 18.0
+    };
+    let values: Vec<f64> = (0..mesh.num_cells()).map(|c| average(mesh.cell_centre(c).y)).collect();
+    let points = mesh.cells_to_points(&values);
+    let field = PointField::of_cells(&mesh, &values, &points, Symmetry::None);
+    let [x, z] = [0.5 * cells[0] as f64 + 0.2, 0.5 * cells[2] as f64];
+    let nx = cells[0] + 1;
+    let mut worst = 0.0f64;
+    let value = |y: f64| {
+        // The trilinear shares of the cell around.
+        let at = DVec3::new(x, y, z);
+        let cell = at.floor().as_uvec3().to_array().map(|i| i as usize);
+        let cell: [usize; 3] = std::array::from_fn(|a| cell[a].min(cells[a] - 1));
+        let t = at - DVec3::from_array(cell.map(|i| i as f64));
+        let (mut ids, mut weights) = (vec![], vec![]);
+        for corner in 0..8usize {
+            let o = [corner & 1, corner >> 1 & 1, corner >> 2];
+            let of = |a: usize| if o[a] == 1 { t[a] } else { 1.0 - t[a] };
+            let [i, j, k]: [usize; 3] = std::array::from_fn(|a| cell[a] + o[a]);
+            ids.push((i + nx * (j + (cells[1] + 1) * k)) as u32);
+            weights.push(of(0) * of(1) * of(2));
+        }
+        field.at(&mesh, &ids, &weights, at)[0]
+    };
+    let h = 1e-3;
+    for n in 0..200 {
+        let y = middle + (f64::from(n) / 100.0 - 1.0) * 3.0 * sigma;
+        let exact = -(y - middle) / (sigma * sigma) * bell(y);
+        worst = worst.max(((value(y + h) - value(y - h)) / (2.0 * h) - exact).abs());
+    }
+    worst / ((-0.5f64).exp() / sigma)
+}
+
+/// A polynomial over the forty nearest cells of one layer reaches over seven of them, and did not
+/// fit a bell of six.
+#[test]
+fn one_layer_of_cells_resolves_what_many_layers_do() {
+    for sigma in [2.5, 4.0] {
+        let [layer, space] = [1, 12].map(|nz| error_of_a_bell([12, 40, nz], sigma));
+        assert!(layer < 1.5 * space + 1e-3, "{sigma}: {layer:e}, in space {space:e}");
+        assert!(space < 0.04, "{sigma}: {space:e}");
+    }
+    // One row of cells has one dimension.
+    let row = error_of_a_bell([1, 40, 1], 2.5);
+    assert!(row < 0.05, "{row:e}");
 }
