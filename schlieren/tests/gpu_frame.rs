@@ -221,7 +221,7 @@ fn only_pixels_come_back_and_each_part_of_a_frame_is_submitted_once() {
     let flow = [16 * 16 * 19 * 19, 4 * 19 * 19 * 19];
     let rays = 4096 * 64 + 96;
     let frames = work.submissions - 1;
-    let others = rays + 96 + frames * 336;
+    let others = rays + 96 + frames * 352;
     assert!(flow.contains(&(work.bytes_to_device - others)), "{work:?}");
 
     // The picture alone is filtered on the device.
@@ -231,6 +231,38 @@ fn only_pixels_come_back_and_each_part_of_a_frame_is_submitted_once() {
     let picture = out.report.device.unwrap();
     assert!((3..=most + 1).contains(&picture.submissions), "{picture:?}, {most}");
     assert_eq!(picture.bytes_from_device, 41 * 30 * 4 + 48 + 4096 * 32);
+}
+
+/// The page asks for the noise of each of its frames.
+#[test]
+fn the_noise_of_a_picture_comes_back_with_it_and_not_the_film() {
+    if !has_gpu() {
+        return;
+    }
+    let field = cube(17, lopsided);
+    let color = "[technique]\nkind = \"schlieren\"\n[technique.cutoff]\nkind = \
+                 \"color\"\nradius_m = 2e-3\n[light.source]\nkind = \"point\"\n";
+    for (technique, channels) in [(KNIFE, 1), (color, 3)] {
+        for samples in [2, 7] {
+            let rest =
+                format!("{technique}[sampling]\nmethod = \"photons\"\nsamples = {samples}\n");
+            let [gpu, cpu] = ["gpu", "cpu"].map(|d| {
+                let scene = scene(d, "", &rest);
+                let section = TestSection::of_fields(&scene, vec![field.clone()], None).unwrap();
+                let layers = Layers { noise: true, ..Layers::NONE };
+                render(&scene, &section, layers, &Control::default()).unwrap()
+            });
+            let work = gpu.report.device.unwrap();
+            let pixels = 2 * 4 * 41 * 30 * channels;
+            assert_eq!(work.bytes_from_device, pixels + 48 + 4096 * 32, "{work:?}");
+            assert!(difference(&gpu, &cpu)[0] < 2e-5);
+            let [on_gpu, on_cpu] = [&gpu, &cpu].map(|r| r.noise.as_ref().unwrap());
+            let pairs = || on_gpu.iter().zip(on_cpu);
+            let worst = pairs().map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+            let largest = on_cpu.iter().copied().fold(0.0, f32::max);
+            assert!(worst < 2e-5 && largest > 1e-3, "{samples}: {worst:e} of {largest:e}");
+        }
+    }
 }
 
 /// The filters of the device are those of the CPU, also where they reach over the image's edge.

@@ -156,6 +156,17 @@ impl Tally {
     }
 }
 
+/// A picture, filtered.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Photograph<const C: usize> {
+    /// Brightness of each pixel.
+    pub(crate) pixels: Vec<[f32; C]>,
+    /// Half the difference of the pictures of two halves of the photons, if it was wanted.
+    pub(crate) noise: Option<Vec<[f32; C]>>,
+    /// What became of the light.
+    pub(crate) tally: Tally,
+}
+
 /// Sums of energy and photons per pixel. `C` is the number of channels: 1, or 3 for colours.
 #[derive(Debug)]
 pub struct Film<const C: usize> {

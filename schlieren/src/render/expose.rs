@@ -181,7 +181,7 @@ fn expose_line<const C: usize>(
                 &mut r.report,
             )?;
             let (picture, tally) = match by_gpu {
-                Some(made) => made,
+                Some(made) => (made.pixels, made.tally),
                 None => {
                     let film = Film::<C>::new(framing, false);
                     let tally = expose_beams(setup, &film, cells_per_side, cancel, &progress)
@@ -207,18 +207,21 @@ fn expose_line<const C: usize>(
             let two = layers.noise && samples > 1;
             let progress = |n| finished(total, n);
             let control = FilmControl { cancel, progress: &progress };
-            if !(two || layers.counts) {
+            if !layers.counts {
                 let by_gpu = on_gpu::photograph_photons(
                     planned,
                     setup,
                     framing,
-                    (samples, filter),
+                    (samples, filter, two),
                     &control,
                     &mut r.report,
                 )?;
-                if let Some((picture, tally)) = by_gpu {
-                    add_photons(&mut r.report, &tally, setup);
-                    return Ok(picture);
+                if let Some(made) = by_gpu {
+                    add_photons(&mut r.report, &made.tally, setup);
+                    if let Some(noise) = made.noise {
+                        r.noise = Some(strongest(&noise, scene.exposure() as f32));
+                    }
+                    return Ok(made.pixels);
                 }
             }
             let films: Vec<Film<C>> =
@@ -314,5 +317,11 @@ fn noise<const C: usize>(
         Filter::Mean { radius_px } => crate::filter::mean::mean(&difference, width, radius_px),
         Filter::None | Filter::Cone { .. } => difference,
     };
-    difference.iter().map(|d| d.iter().fold(0.0f32, |m, v| m.max(v.abs()))).collect()
+    strongest(&difference, 1.0)
+}
+
+/// The largest deviation of each pixel's channels, times the exposure.
+fn strongest<const C: usize>(difference: &[[f32; C]], exposure: f32) -> Vec<f32> {
+    let of = |d: &[f32; C]| d.iter().fold(0.0f32, |m, v| m.max((exposure * v).abs()));
+    difference.par_iter().map(of).collect()
 }

@@ -7,7 +7,7 @@ use super::section::Caches;
 use super::{RenderError, Report};
 use crate::field::Field;
 use crate::film::photons::Exposure;
-use crate::film::{Film, Framing, Tally};
+use crate::film::{Film, Framing, Photograph, Tally};
 use crate::filter::Filter;
 use crate::plan::Request;
 use crate::scene::{Device, MarchSpec};
@@ -174,28 +174,26 @@ pub(super) fn on_gpu<'a>(
     }
 }
 
-/// Brightness of each pixel, and what became of the light.
-pub(super) type Picture<const C: usize> = (Vec<[f32; C]>, Tally);
-
 /// A picture by photons, made where the paths are, if that is a GPU that can: `Ok(None)` where the
 /// CPU must. A warning says why the GPU cannot.
 pub(super) fn photograph_photons<const C: usize>(
     planned: &PlannedPaths<'_>,
     setup: &Exposure<'_>,
     framing: Framing,
-    (samples, filter): (u32, Filter),
+    (samples, filter, noise): (u32, Filter, bool),
     control: &FilmControl<'_>,
     report: &mut Report,
-) -> Result<Option<Picture<C>>, RenderError> {
+) -> Result<Option<Photograph<C>>, RenderError> {
     #[cfg(feature = "gpu")]
     if let (Some(device), Some(filter)) = (&planned.on_device, filter.weights()) {
         let FilmControl { cancel, progress } = *control;
+        let filter = (&filter[..], noise);
         return exposed(
-            device.photograph_photons(setup, framing, 0..samples, &filter, cancel, progress),
+            device.photograph_photons(setup, framing, 0..samples, filter, cancel, progress),
             report,
         );
     }
-    let _ = (planned, setup, framing, samples, filter, control, report);
+    let _ = (planned, setup, framing, samples, filter, noise, control, report);
     Ok(None)
 }
 
@@ -207,7 +205,7 @@ pub(super) fn photograph_beams<const C: usize>(
     per_side: u32,
     control: &FilmControl<'_>,
     report: &mut Report,
-) -> Result<Option<Picture<C>>, RenderError> {
+) -> Result<Option<Photograph<C>>, RenderError> {
     #[cfg(feature = "gpu")]
     if let Some(device) = &planned.on_device {
         let FilmControl { cancel, progress } = *control;

@@ -25,12 +25,13 @@ impl FilmLayout {
         }
     }
 
-    /// The film of a picture that is filtered on the device.
-    pub(super) fn of_picture<const C: usize>(framing: &Framing) -> FilmLayout {
-        FilmLayout { pixels: framing.pixels(), channels: C, films: 1, counts: false }
+    /// The film of a picture that is filtered on the device; two films if its noise is wanted.
+    pub(super) fn of_picture<const C: usize>(framing: &Framing, noise: bool) -> FilmLayout {
+        let films = if noise { 2 } else { 1 };
+        FilmLayout { pixels: framing.pixels(), channels: C, films, counts: false }
     }
 
-    /// Bytes of a picture.
+    /// Bytes of a picture, or of its noise.
     pub(super) fn picture_bytes(&self) -> u64 {
         4 * (self.pixels * self.channels) as u64
     }
@@ -87,8 +88,8 @@ pub(super) fn add_to_films<const C: usize>(layout: FilmLayout, words: &[u32], fi
     }
 }
 
-/// The picture that came back.
-pub(super) fn picture<const C: usize>(words: &[u32]) -> Vec<[f32; C]> {
+/// The pictures that came back, one after the other: the picture itself, and its noise.
+pub(super) fn pictures<const C: usize>(words: &[u32]) -> Vec<[f32; C]> {
     let (pixels, _) = words.split_at(words.len() - 2 * OUTCOMES);
     let pixel = |p: &[u32]| std::array::from_fn(|c| f32::from_bits(p[c]));
     pixels.par_chunks_exact(C).with_min_len(1 << 13).map(pixel).collect()

@@ -1,6 +1,6 @@
 // Turns the sums of a film into brightness and filters its noise: rows first, then columns, as
-// filter/mod.rs does. The host adds `const ROWS`, and `seen` and `result` of filter_rows.wgsl or
-// filter_columns.wgsl.
+// filter/mod.rs does. The host adds `const ROWS`, `FILMS` and `NOISE`, and `seen` and `result` of
+// filter_rows.wgsl or filter_columns.wgsl.
 
 // Weights of pixels by distance.
 @group(1) @binding(6) var<storage, read> weights: array<f32>;

@@ -57,6 +57,10 @@ struct Frame {
     dots_seed: u32,
     // One over the photons that the undisturbed beam leaves in a pixel.
     per_photon: f32,
+    // The same of the two films of a picture with noise.
+    per_photon_of_film: vec2f,
+    unused_0: f32,
+    unused_1: f32,
     // Numbers of the technique.
     technique: array<vec4f, 4>,
 }

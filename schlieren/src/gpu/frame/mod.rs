@@ -29,8 +29,8 @@ use super::cpu_fallback::Failure;
 use super::paths::DeviceState;
 use super::{GpuError, GpuPaths};
 use crate::film::photons::Exposure;
-use crate::film::{Film, Framing, Tally};
-use film::{FilmLayout, add_to_films, outcomes, picture};
+use crate::film::{Film, Framing, Photograph, Tally};
+use film::{FilmLayout, add_to_films, outcomes, pictures};
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 use submissions::FrameOnDevice;
@@ -102,7 +102,8 @@ impl GpuPaths<'_> {
     }
 
     /// A picture by photons, filtered with weights by distance along rows and columns: brightness
-    /// of each pixel.
+    /// of each pixel. With `noise` also half the difference of the pictures that even and odd
+    /// passes make.
     ///
     /// # Errors
     /// If it was cancelled, or the device cannot make this picture.
@@ -111,16 +112,18 @@ impl GpuPaths<'_> {
         exposure: &Exposure<'_>,
         framing: Framing,
         passes: Range<u32>,
-        filter: &[f64],
+        (filter, noise): (&[f64], bool),
         cancel: &AtomicBool,
         progress: &(dyn Fn(u64) + Sync),
-    ) -> Result<(Vec<[f32; C]>, Tally), NotExposed> {
+    ) -> Result<Photograph<C>, NotExposed> {
         let light = Light::Photons { passes };
-        let layout = FilmLayout::of_picture::<C>(&framing);
+        let layout = FilmLayout::of_picture::<C>(&framing, noise);
         let filter = Some(filter);
         let (words, tally) =
             self.expose(exposure, framing, layout, light, filter, cancel, progress)?;
-        Ok((picture(&words), tally))
+        let mut pixels = pictures(&words);
+        let noise = noise.then(|| pixels.split_off(framing.pixels()));
+        Ok(Photograph { pixels, noise, tally })
     }
 
     /// A picture by beams ([`crate::film::beams::expose_beams`]): brightness of each pixel.
@@ -134,13 +137,13 @@ impl GpuPaths<'_> {
         per_side: u32,
         cancel: &AtomicBool,
         progress: &(dyn Fn(u64) + Sync),
-    ) -> Result<(Vec<[f32; C]>, Tally), NotExposed> {
+    ) -> Result<Photograph<C>, NotExposed> {
         let light = Light::Beams { per_side };
-        let layout = FilmLayout::of_picture::<C>(&framing);
+        let layout = FilmLayout::of_picture::<C>(&framing, false);
         let filter = Some(&[1.0][..]);
         let (words, tally) =
             self.expose(exposure, framing, layout, light, filter, cancel, progress)?;
-        Ok((picture(&words), tally))
+        Ok(Photograph { pixels: pictures(&words), noise: None, tally })
     }
 
     #[allow(clippy::too_many_arguments, reason = "the parts of a job, which it puts together")]
@@ -300,7 +303,7 @@ mod tests {
         let job = Job {
             exposure: &exposure,
             framing,
-            layout: FilmLayout::of_picture::<1>(&framing),
+            layout: FilmLayout::of_picture::<1>(&framing, false),
             technique: &broken,
             light: Light::Photons { passes: 0..1 },
             filter: Some(&[1.0]),

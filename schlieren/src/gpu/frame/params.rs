@@ -47,6 +47,8 @@ pub(super) struct FrameParams {
     source_axis: [f32; 2],
     pub(super) dots_seed: u32,
     pub(super) per_photon: f32,
+    pub(super) per_photon_of_film: [f32; 2],
+    unused: [f32; 2],
     pub(super) technique: [[f32; 4]; 4],
 }
 

@@ -74,10 +74,14 @@ impl FrameShader<'_> {
         self.light() + &channels + include_str!("frame.wgsl") + include_str!("corners.wgsl")
     }
 
-    /// Filters the film along rows, or what comes of it along columns. The entry point is
-    /// `filter_noise`.
-    pub(super) fn filter(&self, rows: bool) -> String {
-        let constants = format!("const CHANNELS = {}u;\nconst ROWS = {rows};\n", self.channels);
+    /// Filters the film along rows, or what comes of it along columns: the picture, or with
+    /// `noise` the difference of its two films. The entry point is `filter_noise`.
+    pub(super) fn filter(&self, rows: bool, films: usize, noise: bool) -> String {
+        let constants = format!(
+            "const CHANNELS = {}u;\nconst ROWS = {rows};\nconst FILMS = {films}u;\nconst NOISE = \
+             {noise};\n",
+            self.channels
+        );
         let of_pass = if rows {
             include_str!("filter_rows.wgsl")
         } else {
@@ -175,7 +179,7 @@ mod tests {
                     shader.photons(),
                     shader.corners(),
                     shader.triangles(),
-                    shader.filter(k & 1 == 0),
+                    shader.filter(k & 1 == 0, 1 + (k as usize >> 1 & 1), k & 2 != 0),
                 ] {
                     let module = parsed(&wgsl);
                     let mut v = Validator::new(ValidationFlags::all(), Capabilities::empty());

@@ -40,8 +40,8 @@ pub(super) struct FrameOnDevice<'a> {
     bodies: Option<wgpu::Buffer>,
     /// Kernels with what is bound to them, in the order in which they run.
     kernels: Vec<BoundKernel>,
-    /// Kernels that make the picture of the film, and the picture.
-    picture: Option<(Vec<BoundKernel>, wgpu::Buffer)>,
+    /// Kernels that make the picture of the film, and the picture; the same for its noise.
+    pictures: Vec<(Vec<BoundKernel>, wgpu::Buffer)>,
     in_flight: VecDeque<InFlight>,
     progress: &'a (dyn Fn(u64) + Sync),
 }
@@ -147,16 +147,23 @@ impl<'a> FrameOnDevice<'a> {
                 kernels.push((pipeline, groups));
             }
         }
-        let picture = match job.filter {
-            None => None,
-            Some(weights) => {
-                params.per_photon = match &job.light {
-                    Light::Photons { passes } => 1.0 / passes.len() as f32,
-                    Light::Beams { .. } => 1.0,
-                };
-                Some(filter(paths, &gpu, &shader, layout, weights, [&frame, &film])?)
+        let mut pictures = Vec::new();
+        if let Some(weights) = job.filter {
+            params.per_photon = match &job.light {
+                Light::Photons { passes } => 1.0 / passes.len() as f32,
+                Light::Beams { .. } => 1.0,
+            };
+            if let Light::Photons { passes } = &job.light {
+                // Passes expose the films in turn, from the first.
+                let odd = (passes.start % 2) as usize;
+                let halves = [(passes.len() + 1 - odd) / 2, (passes.len() + odd) / 2];
+                params.per_photon_of_film = halves.map(|n| 1.0 / n.max(1) as f32);
             }
-        };
+            for noise in [false, true].into_iter().take(layout.films()) {
+                let buffers = [&frame, &film];
+                pictures.push(filter(paths, &gpu, &shader, layout, (weights, noise), buffers)?);
+            }
+        }
         let (layout, progress) = (*layout, job.progress);
         let in_flight = VecDeque::new();
         Ok(FrameOnDevice {
@@ -167,7 +174,7 @@ impl<'a> FrameOnDevice<'a> {
             film,
             bodies,
             kernels,
-            picture,
+            pictures,
             in_flight,
             progress,
         })
@@ -307,21 +314,29 @@ impl<'a> FrameOnDevice<'a> {
     /// Waits for the film and reads its words.
     pub(super) fn read(mut self, paths: &GpuPaths<'_>) -> Result<Vec<u32>, GpuError> {
         let [first_outcome, outcomes] = self.layout.outcome_bytes();
-        let before =
-            if self.picture.is_some() { self.layout.picture_bytes() } else { first_outcome };
+        let of_picture = self.layout.picture_bytes();
+        let before = match self.pictures.len() {
+            0 => first_outcome,
+            count => count as u64 * of_picture,
+        };
         let bytes = before + outcomes;
         let gpu = Arc::clone(&self.gpu);
         let usage = BufferUsages::MAP_READ | BufferUsages::COPY_DST;
         let readback = gpu.checked(|| gpu.buffer(bytes as usize, usage))?;
         let mut commands = gpu.device.create_command_encoder(&Default::default());
-        let mut from = &self.film;
-        if let Some((kernels, picture)) = &self.picture {
+        for (kernels, _) in &self.pictures {
             let groups = [self.params.width.div_ceil(TILE as u32), self.params.height];
             run(&mut commands, kernels, &[groups; 2]);
-            paths.work.add_submission(2);
-            from = picture;
         }
-        commands.copy_buffer_to_buffer(from, 0, &readback, 0, before);
+        if self.pictures.is_empty() {
+            commands.copy_buffer_to_buffer(&self.film, 0, &readback, 0, before);
+        } else {
+            paths.work.add_submission(2 * self.pictures.len() as u64);
+        }
+        for (n, (_, picture)) in self.pictures.iter().enumerate() {
+            let to = n as u64 * of_picture;
+            commands.copy_buffer_to_buffer(picture, 0, &readback, to, of_picture);
+        }
         commands.copy_buffer_to_buffer(&self.film, first_outcome, &readback, before, outcomes);
         gpu.queue.submit([commands.finish()]);
         while !self.in_flight.is_empty() {
@@ -333,13 +348,13 @@ impl<'a> FrameOnDevice<'a> {
     }
 }
 
-/// The kernels that filter a film along rows and columns, and the picture.
+/// The kernels that filter a film along rows and columns, and the picture or its noise.
 fn filter(
     paths: &GpuPaths<'_>,
     gpu: &Gpu,
     shader: &FrameShader<'_>,
     layout: &FilmLayout,
-    weights: &[f64],
+    (weights, noise): (&[f64], bool),
     [frame, film]: [&wgpu::Buffer; 2],
 ) -> Result<(Vec<BoundKernel>, wgpu::Buffer), GpuError> {
     let weights: Vec<f32> = weights.iter().map(|w| *w as f32).collect();
@@ -352,7 +367,8 @@ fn filter(
     })?;
     paths.work.add_to_device(of_weights.size());
     let bind = |of_rows: bool| {
-        let pipeline = gpu.pipeline(shader.filter(of_rows), "filter_noise")?;
+        let pipeline =
+            gpu.pipeline(shader.filter(of_rows, layout.films(), noise), "filter_noise")?;
         let (from, to) = if of_rows { ((1, film), (2, &rows)) } else { ((2, &rows), (5, &pixels)) };
         let own = [(0, frame), from, to, (6, &of_weights)].map(|(i, b)| (i, b.as_entire_binding()));
         let groups = gpu.bind(&pipeline, [&[], &own])?;
