@@ -14,6 +14,10 @@ use wgpu::{DeviceType, ErrorFilter};
 /// suspended laptop) may be temporary.
 pub(super) const MAX_REOPENINGS: u32 = 3;
 
+/// Bytes per upload. A larger upload would be copied to staging memory as a whole before its
+/// transfer begins.
+pub(super) const UPLOAD_BYTES: usize = 64 << 20;
+
 /// An open GPU. A program needs only one; see [`Gpu::shared`].
 pub struct Gpu {
     pub(super) device: wgpu::Device,

@@ -1,14 +1,22 @@
 //! Copies the coefficients of a spline to the device in rows of four, so that the 64 of a sample
-//! are 16 reads: a texture for drivers on the CPU, a buffer for discrete GPUs. This takes four times
-//! the memory of slabs.
+//! are 16 reads: a texture for drivers on the CPU, a buffer for discrete GPUs. This takes four
+//! times the memory of slabs.
 
-use super::volume::{UPLOAD_BYTES, Values};
+use super::device::UPLOAD_BYTES;
 use super::{Gpu, GpuError};
 use rayon::prelude::*;
 use wgpu::{BufferUsages, DeviceType};
 
 /// Memory of rows at most. A larger field is copied in slabs.
 const MOST_BYTES: u64 = 1 << 30;
+
+/// Rows on a device.
+pub(super) enum Rows {
+    /// A row of four in each texel.
+    Texture(wgpu::TextureView),
+    /// One after the other.
+    Buffer(wgpu::Buffer),
+}
 
 /// The rows, the strides of neighbours along y and z, and the bytes that they take. `None` if the
 /// device gets slabs: none of its kind was measured, the rows do not fit, or the size of bindings
@@ -20,7 +28,7 @@ pub(super) fn upload(
     gpu: &Gpu,
     coefficients: &[f32],
     dims: [usize; 3],
-) -> Result<Option<(Values, [usize; 2], u64)>, GpuError> {
+) -> Result<Option<(Rows, [usize; 2], u64)>, GpuError> {
     let [columns, height, layers] = dims;
     let width = columns - 3;
     let stride = [width, width * height];
@@ -37,15 +45,15 @@ pub(super) fn upload(
             {
                 return Ok(None);
             }
-            texture(gpu, coefficients, size).map(Values::RowTexture)
+            texture(gpu, coefficients, size).map(Rows::Texture)
         }
         DeviceType::DiscreteGpu if bytes <= gpu.binding_bytes() => {
-            buffer(gpu, coefficients, columns, bytes).map(Values::RowBuffer)
+            buffer(gpu, coefficients, columns, bytes).map(Rows::Buffer)
         }
         _ => return Ok(None),
     };
     match made {
-        Ok(values) => Ok(Some((values, stride, bytes))),
+        Ok(rows) => Ok(Some((rows, stride, bytes))),
         // Slabs may still fit the memory of a device that works.
         Err(_) if gpu.failure().is_none() => Ok(None),
         Err(e) => Err(e),

@@ -1,17 +1,15 @@
 //! Copies the field to the device: its nodes or the coefficients of its spline, in slabs of layers
 //! that fit a binding.
 
+use super::device::UPLOAD_BYTES;
 use super::kernel::{FIRST_SLAB, FieldLayout, Kernel};
-use super::{Gpu, GpuError, rows};
+use super::rows::{self, Rows};
+use super::{Gpu, GpuError};
 use crate::field::Field;
 use crate::interpolate::{BSpline, Interpolant};
 use crate::march::FieldCache;
 use std::sync::{Arc, Mutex, PoisonError};
 use wgpu::{BufferDescriptor, BufferUsages};
-
-/// Bytes per upload. A larger upload would be copied to staging memory as a whole before its
-/// transfer begins.
-pub(super) const UPLOAD_BYTES: usize = 64 << 20;
 
 /// Keeps a field on the device for the next image of it. The owner must pass the same field to
 /// every call.
@@ -58,18 +56,16 @@ impl VolumeCache {
 pub(super) enum Values {
     /// Slabs along z. Neighbouring slabs share the layers that cells at their border need.
     Slabs(Vec<wgpu::Buffer>),
-    /// Coefficients of the spline, a row of four in each texel.
-    RowTexture(wgpu::TextureView),
-    /// Coefficients of the spline, a row of four for each.
-    RowBuffer(wgpu::Buffer),
+    /// Coefficients of the spline, each with the three that follow.
+    Rows(Rows),
 }
 
 impl Values {
     pub(super) fn layout(&self) -> FieldLayout {
         match self {
             Values::Slabs(slabs) => FieldLayout::Slabs(slabs.len() as u32),
-            Values::RowTexture(_) => FieldLayout::RowTexture,
-            Values::RowBuffer(_) => FieldLayout::RowBuffer,
+            Values::Rows(Rows::Texture(_)) => FieldLayout::RowTexture,
+            Values::Rows(Rows::Buffer(_)) => FieldLayout::RowBuffer,
         }
     }
 
@@ -80,10 +76,10 @@ impl Values {
                 let resources = slabs.iter().map(wgpu::Buffer::as_entire_binding);
                 (FIRST_SLAB..).zip(resources).collect()
             }
-            Values::RowTexture(view) => {
+            Values::Rows(Rows::Texture(view)) => {
                 vec![(FIRST_SLAB, wgpu::BindingResource::TextureView(view))]
             }
-            Values::RowBuffer(rows) => vec![(FIRST_SLAB, rows.as_entire_binding())],
+            Values::Rows(Rows::Buffer(rows)) => vec![(FIRST_SLAB, rows.as_entire_binding())],
         }
     }
 }
@@ -135,8 +131,8 @@ impl DeviceVolume {
         if spline.is_some()
             && let Some(rows) = rows::upload(gpu, values, [nx + 2, ny + 2, nz + 2])?
         {
-            let (values, stride, of_rows) = rows;
-            let bytes = of_kinds + of_rows;
+            let (rows, stride, of_rows) = rows;
+            let (values, bytes) = (Values::Rows(rows), of_kinds + of_rows);
             return Ok(DeviceVolume { values, kinds, stride, layers: nz - 1, bytes });
         }
         let Some((count, layers)) =
