@@ -49,8 +49,7 @@ impl Counts {
             let diagonal = DVec3::new(m.x_axis.x, m.y_axis.y, m.z_axis.z);
             let largest = diagonal.max_position();
             let pivot = diagonal[largest];
-            // NaN is none.
-            if !(pivot > FLATNESS * trace) {
+            if pivot.is_nan() || pivot <= FLATNESS * trace {
                 break;
             }
             let column = m.col(largest);
