@@ -32,7 +32,7 @@ pub fn revolved_bounds(mesh: &Mesh) -> Result<(DVec3, DVec3), ResampleError> {
     Ok((DVec3::new(low.x, -high.y, -high.y), DVec3::new(high.x, high.y, high.y)))
 }
 
-/// As [`resample`], for a mesh made by [`Mesh::with_plane`] with a span that is
+/// As [`super::resample()`], for a mesh made by [`Mesh::with_plane`] with a span that is
 /// small compared with the lattice's spacing.
 pub fn revolve(
     mesh: &Mesh,
