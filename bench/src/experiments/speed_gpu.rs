@@ -78,7 +78,7 @@ fn measure(
     record.column(
         "from_idle",
         "ms",
-        "wall time of the first of them, when the GPU had nothing to do and its clock was low; \
+        "wall time of the first of them, after the GPU had nothing to do during the CPU's frame; \
          median over the rounds",
     );
     record.column("rounds", "", "rounds; CPU and GPU took turns");

@@ -52,10 +52,13 @@ pub fn revolve(
     spacing.z *= 0.5;
     let image =
         Lattice { dims, origin: DVec3::new(low.x, low.y, low.z + 0.5 * spacing.z), spacing };
-    let flat = resample_with(mesh, samples, &image, options, Symmetry::Axis)?;
+    // Gas on the other side of a body is no neighbour.
+    let reaches_axis = low.y <= AXIS_GAP * high.y;
+    let symmetry = if reaches_axis { Symmetry::Axis } else { Symmetry::Rings };
+    let flat = resample_with(mesh, samples, &image, options, symmetry)?;
 
     // Each node reads the image at its radius.
-    let r_low = if low.y <= AXIS_GAP * high.y { low.y } else { 0.0 };
+    let r_low = if reaches_axis { low.y } else { 0.0 };
     let per_layer = lattice.dims[0] * lattice.dims[1];
     let mut values = vec![f32::NAN; lattice.len()];
     let mut marks = vec![Mark::Outside; lattice.len()];

@@ -456,6 +456,25 @@ fn averages_over_rings_give_the_flow_on_the_axis() {
     assert!(on_axis < 2e-3 && worst < 3e-3, "{on_axis:e} on the axis, {worst:e}");
 }
 
+/// The gas beyond a thin body is no neighbour of that before it.
+#[test]
+fn nothing_is_seen_through_a_body_on_the_axis() {
+    let plane = ImageData::new([11, 10, 1], DVec3::new(0.0, 1.5, 0.0), DVec3::ONE);
+    let mesh = Mesh::with_plane(&Dataset::ImageData(plane), Plane::Extrude { span: 1e-4 }).unwrap();
+    let values = at_points(&mesh, |p| p.y);
+    let (low, high) = revolved_bounds(&mesh).unwrap();
+    let lattice = Lattice::fit(low, high, 1.0, Resolution::Spacing(0.5)).unwrap();
+    let r = revolve(&mesh, Samples::Points(&values), &lattice, &Options::default()).unwrap();
+    let [nx, ny, _] = lattice.dims;
+    for (i, v) in r.values.iter().enumerate().filter(|(i, _)| r.marks[*i] == Mark::Inside) {
+        let p = lattice.node(i % nx, i / nx % ny, i / nx / ny);
+        let radius = p.y.hypot(p.z);
+        if radius >= 1.5 {
+            assert!((f64::from(*v) - radius).abs() < 1e-4, "{v} at {p}");
+        }
+    }
+}
+
 #[test]
 fn the_depth_of_a_plane_says_nothing_of_the_size_of_its_cells() {
     let points = (0..121).map(|i| [0.1 * f64::from(i % 11), 0.1 * f64::from(i / 11), 0.0]);

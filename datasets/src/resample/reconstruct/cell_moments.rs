@@ -25,7 +25,9 @@ impl CellMoments {
         let moments = |cell: usize| match (mesh.is_hidden(cell), symmetry) {
             (true, _) => NO_VOLUME,
             (false, Symmetry::None) => of_cell(mesh, &mesh.corners(cell)),
-            (false, Symmetry::Axis) => of_cell(mesh, &mesh.corners(cell)).of_ring(),
+            (false, Symmetry::Rings | Symmetry::Axis) => {
+                of_cell(mesh, &mesh.corners(cell)).of_ring()
+            }
         };
         CellMoments { cells: (0..mesh.num_cells()).into_par_iter().map(moments).collect() }
     }

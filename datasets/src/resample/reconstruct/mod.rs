@@ -64,7 +64,9 @@ impl Reconstruction {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Symmetry {
     None,
-    /// The axis is y = 0, and y is the radius. Cells are rings.
+    /// y is the radius: cells are rings about a body.
+    Rings,
+    /// As these, and the flow reaches the axis y = 0.
     Axis,
 }
 
