@@ -382,7 +382,7 @@ impl World {
 /// Whether an active ray's direction is so short or long that the single-ray code rescales it. A
 /// NaN direction is left to the packet.
 #[inline(never)]
-fn any_unusual_length<S: Simd>(simd: S, rays: &[RayBlock]) -> bool {
+pub(super) fn any_unusual_length<S: Simd>(simd: S, rays: &[RayBlock]) -> bool {
     simd.vectorize(
         #[inline(always)]
         || {

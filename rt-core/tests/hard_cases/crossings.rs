@@ -280,6 +280,102 @@ fn lists_of_blocks_are_those_of_single_rays_and_respect_their_limit() {
     assert_eq!(world.all_hits(through, 2).unwrap().len(), 2);
 }
 
+/// Worlds of one mesh, of several that share a tree, of instances, and of shapes.
+fn worlds(options: &BuildOptions) -> Vec<(&'static str, World)> {
+    let (positions, indices) = icosphere(2);
+    let ball = |center: Vec3, radius: f32| {
+        let place = |p: &DVec3| p.as_vec3() * radius + center;
+        Geometry::Mesh(Arc::new(TriMesh::new(
+            positions.iter().map(place).collect(),
+            indices.clone(),
+        )))
+    };
+    let balls = [ball(Vec3::splat(1.5), 1.4), ball(Vec3::ONE, 1.0), ball(Vec3::splat(2.0), 0.3)];
+    let spheres = Spheres::new(vec![Vec3::ONE, Vec3::splat(2.0)], Radii::Common(1.0)).unwrap();
+    let of = |geometries: &[Geometry], places: &[(usize, DAffine3)]| {
+        let place = |&(geometry, world_from_object)| Instance { geometry, world_from_object };
+        let instances = places.iter().map(place).collect();
+        World::build(geometries.to_vec(), instances, options).unwrap()
+    };
+    let here = DAffine3::IDENTITY;
+    let turned = DAffine3::from_translation(DVec3::X) * DAffine3::from_rotation_z(0.3);
+    let shapes = [Geometry::Shape(Arc::new(spheres))];
+    vec![
+        ("one mesh", world(&lattice_box(3), options)),
+        ("three meshes", of(&balls, &[(0, here), (1, here), (2, here)])),
+        ("instances", of(&balls, &[(0, here), (1, turned), (1, here)])),
+        ("one turned", of(&balls[..1], &[(0, turned)])),
+        ("spheres", of(&shapes, &[(0, here)])),
+    ]
+}
+
+#[test]
+fn rays_in_turns_have_all_hits_of_single_rays_in_any_world() {
+    let mut random = SplitMix64::new(31);
+    let mut rays = lattice_rays(300, 3, &mut random);
+    for _ in 0..300 {
+        let origin = (random.direction() * 6.0).as_vec3();
+        let target = Vec3::from_array([0; 3].map(|_| random.between(0.0, 3.0) as f32));
+        rays.push(Ray::new(origin, target - origin));
+    }
+    // A block each of directions of unusual lengths, of rays from far away, and of short ranges.
+    for ray in &rays.clone()[290..306] {
+        rays.push(Ray { dir: ray.dir * 1e-30, ..*ray });
+    }
+    for ray in &rays.clone()[290..306] {
+        rays.push(Ray { origin: ray.origin - ray.dir * 1e6, ..*ray });
+    }
+    for ray in &rays.clone()[290..306] {
+        rays.push(Ray { t_min: 0.7, ..ray.with_t_max(1.1) });
+    }
+    let mut blocks = RayBlock::from_rays(&rays);
+    (blocks[3].t_max[5], blocks[3].ox[6], blocks[3].dz[7]) = (-1.0, f32::NAN, f32::INFINITY);
+    for options in all_options() {
+        for (name, world) in worlds(&options) {
+            let lists = world.all_hits_of_blocks(&blocks, 1_000_000).unwrap();
+            let mut counts = vec![[9; LANES]; blocks.len()];
+            world.count_hits_of_blocks(&blocks, &mut counts).unwrap();
+            let mut ends = Vec::new();
+            for i in 0..lists.num_rays() {
+                let ray = blocks[i / LANES].get(i % LANES);
+                let bits_of = |hits: &[_]| hits.iter().map(|h| bits(Some(*h))).collect::<Vec<_>>();
+                let alone = bits_of(&world.all_hits(&ray, 1000).unwrap());
+                assert_eq!(bits_of(lists.of_ray(i)), alone, "{name}, {options:?}: ray {i}");
+                assert_eq!(counts[i / LANES][i % LANES] as usize, alone.len(), "{name}: ray {i}");
+                ends.push(lists.starts()[i + 1]);
+            }
+            assert!(lists.hits().len() > 200, "{name}: {} hits", lists.hits().len());
+            // The ray at which there is no more room is the first, in the order of the call.
+            for limit in [0, 1, ends[300], lists.hits().len() - 1] {
+                let ray = ends.iter().position(|end| *end > limit).unwrap();
+                let error = world.all_hits_of_blocks(&blocks, limit);
+                assert_eq!(error, Err(TooManyHits { ray, limit }), "{name}, {options:?}");
+            }
+        }
+    }
+    let world = world(&lattice_box(3), &BuildOptions::default());
+    assert!(world.count_hits_of_blocks(&blocks, &mut [[0; LANES]]).is_err());
+}
+
+#[test]
+fn many_points_are_enclosed_where_single_points_are() {
+    let mut random = SplitMix64::new(12);
+    let point = |_| Vec3::from_array([0; 3].map(|_| random.between(-0.5, 3.5) as f32));
+    let mut points: Vec<Vec3> = (0..700).map(point).collect();
+    points.extend([Vec3::NAN, Vec3::splat(1e30)]);
+    for options in some_options() {
+        for (name, world) in worlds(&options) {
+            let mut inside = vec![true; points.len()];
+            world.encloses(&points, &mut inside).unwrap();
+            let alone = points.iter().map(|p| !world.instances_around(*p).is_empty());
+            assert!(inside.iter().copied().eq(alone), "{name}, {options:?}");
+            let count = inside.iter().filter(|i| **i).count();
+            assert!((20..690).contains(&count), "{name}: {count} points are inside");
+            assert!(world.encloses(&points, &mut [false]).is_err());
+        }
+    }
+}
+
 #[test]
 fn spheres_are_entered_and_left() {
     let spheres = Spheres::new(vec![Vec3::ZERO, Vec3::X * 4.0], Radii::Common(1.0)).unwrap();

@@ -1,12 +1,16 @@
 //! All surfaces that a ray crosses, not the nearest alone: thickness, parity, lengths in bodies.
 
 mod collect;
+mod in_turns;
 mod inside;
 
+use super::streams::{StreamError, same_length};
+use super::traverse::packet::GROUPS;
 use super::world::{World, with_ordinary_length};
 use crate::ray::{Hit, LANES, Ray, RayBlock};
 use collect::Crossings;
 use fearless_simd::dispatch;
+use std::cell::{Cell, RefCell};
 
 /// A list would have become longer than its caller allows.
 ///
@@ -118,13 +122,105 @@ impl World {
         limit: usize,
     ) -> Result<HitLists, TooManyHits> {
         let mut lists = HitLists { starts: vec![0], hits: Vec::new() };
-        for (b, block) in rays.iter().enumerate() {
-            for lane in 0..LANES {
-                self.append_hits(&block.get(lane), b * LANES + lane, limit, &mut lists.hits)?;
-                lists.starts.push(lists.hits.len());
-            }
+        for (group, rays) in rays.chunks(GROUPS).enumerate() {
+            self.append_group(rays, group * GROUPS * LANES, limit, &mut lists)?;
         }
         Ok(lists)
+    }
+
+    /// The lists of at most sixteen blocks, whose first ray is number `first` of the call.
+    fn append_group(
+        &self,
+        rays: &[RayBlock],
+        first: usize,
+        limit: usize,
+        lists: &mut HitLists,
+    ) -> Result<(), TooManyHits> {
+        let num_rays = rays.len() * LANES;
+        let HitLists { starts, hits } = lists;
+        let room = limit.saturating_sub(hits.len());
+        let found = RefCell::new(Vec::new());
+        let full = Cell::new(false);
+        self.visit_hits_of_group(rays, &|ray, hit| {
+            let mut found = found.borrow_mut();
+            full.set(full.get() || found.len() >= room);
+            if !full.get() {
+                found.push((ray, hit));
+            }
+            full.get()
+        });
+        if full.get() {
+            // Rays in turns do not tell which of them is the first for which there is no room.
+            for ray in 0..num_rays {
+                let number = first + ray;
+                self.append_hits(&rays[ray / LANES].get(ray % LANES), number, limit, hits)?;
+                starts.push(hits.len());
+            }
+            return Ok(());
+        }
+        // The rays' lists in one another's place: counted, then filled.
+        let found = found.into_inner();
+        let mut next = [0; GROUPS * LANES + 1];
+        for (ray, _) in &found {
+            next[ray + 1] += 1;
+        }
+        next[0] = hits.len();
+        for ray in 0..num_rays {
+            next[ray + 1] += next[ray];
+        }
+        starts.extend_from_slice(&next[1..=num_rays]);
+        hits.resize(hits.len() + found.len(), UNSET);
+        for (ray, hit) in found {
+            hits[next[ray]] = hit;
+            next[ray] += 1;
+        }
+        let mut from = starts[first];
+        for to in &starts[first + 1..] {
+            sort(&mut hits[from..*to]);
+            from = *to;
+        }
+        Ok(())
+    }
+
+    /// The number of hits of each ray of `rays`, as [`World::count_hits`] gives it: that of the ray
+    /// in lane `l` of block `b` is `counts[b][l]`, 0 for idle lanes. The calling thread does the
+    /// work.
+    ///
+    /// ```
+    /// use rt_core::prelude::*;
+    /// use rt_core::ray::RayBlock;
+    ///
+    /// let corners = vec![Vec3::ZERO, Vec3::X, Vec3::Y];
+    /// let world =
+    ///     World::from_mesh(TriMesh::new(corners, vec![[0, 1, 2]]), &BuildOptions::default())?;
+    /// let ray = |x: f32| Ray::new(Vec3::new(x, 0.25, 1.0), Vec3::NEG_Z);
+    /// let mut counts = [[0; 16]];
+    /// world.count_hits_of_blocks(&RayBlock::from_rays(&[ray(5.0), ray(0.25)]), &mut counts).unwrap();
+    /// assert_eq!(counts[0][..2], [0, 1]);
+    /// # Ok::<(), rt_core::bvh::BuildError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// When the slices differ in length; then no ray is traced.
+    pub fn count_hits_of_blocks(
+        &self,
+        rays: &[RayBlock],
+        counts: &mut [[u32; LANES]],
+    ) -> Result<(), StreamError> {
+        same_length(rays.len(), counts.len())?;
+        for (rays, counts) in rays.chunks(GROUPS).zip(counts.chunks_mut(GROUPS)) {
+            let found = [const { Cell::new(0) }; GROUPS * LANES];
+            self.visit_hits_of_group(rays, &|ray, _| {
+                found[ray].update(|count| count + 1);
+                false
+            });
+            for (counts, found) in counts.iter_mut().zip(found.chunks(LANES)) {
+                for (count, found) in counts.iter_mut().zip(found) {
+                    *count = found.get();
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Number of hits that [`World::all_hits`] would find. Needs no memory for them.
@@ -156,10 +252,21 @@ impl World {
         if full {
             return Err(TooManyHits { ray: number, limit });
         }
-        hits[first..].sort_by(|a, b| {
-            a.t.total_cmp(&b.t).then((a.instance, a.prim).cmp(&(b.instance, b.prim)))
-        });
+        sort(&mut hits[first..]);
         Ok(())
+    }
+
+    /// Passes each hit of at most sixteen blocks to `found`, in no order, with the number of its
+    /// ray. Where `found` returns true, that ray ends.
+    fn visit_hits_of_group(&self, rays: &[RayBlock], found: &dyn Fn(usize, Hit) -> bool) {
+        if self.visit_hits_in_turns(rays, found) {
+            return;
+        }
+        for (b, block) in rays.iter().enumerate() {
+            for lane in 0..LANES {
+                self.visit_hits(&block.get(lane), |hit| found(b * LANES + lane, hit));
+            }
+        }
     }
 
     /// Passes each hit to `found`, in no order, until it returns true.
@@ -172,4 +279,14 @@ impl World {
         let found = |hit: Hit| found(Hit { t: hit.t * unit, ..hit });
         dispatch!(self.level, simd => Crossings::new(self, *ray, found).find(simd));
     }
+}
+
+/// Where a hit will stand.
+const UNSET: Hit = Hit { t: 0.0, u: 0.0, v: 0.0, prim: 0, instance: 0 };
+
+/// The order of a list: by distance; of equal distances, by instance and primitive.
+fn sort(hits: &mut [Hit]) {
+    hits.sort_unstable_by(|a, b| {
+        a.t.total_cmp(&b.t).then((a.instance, a.prim).cmp(&(b.instance, b.prim)))
+    });
 }

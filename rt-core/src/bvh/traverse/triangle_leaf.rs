@@ -41,7 +41,7 @@ pub(crate) fn test_leaf<S: Simd, T: TriangleTest>(
 
 /// Tests the triangles of two leaves against a ray, the first leaf's in the low lanes.
 #[inline(always)]
-fn test_two_leaves<S: Simd, T: TriangleTest>(
+pub(crate) fn test_two_leaves<S: Simd, T: TriangleTest>(
     simd: S,
     leaves: [&LeafFloats; 2],
     ray: &RaySetup,
