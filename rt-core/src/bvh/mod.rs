@@ -24,6 +24,7 @@ mod placement;
 mod query;
 mod ray_query;
 mod refit;
+mod render_space;
 mod several_entries;
 mod stored_mesh;
 mod streams;
@@ -44,6 +45,7 @@ pub use options::{BuildOptions, BuildQuality, BuildReport, Robustness, Storage, 
 pub use partition::GlobalLayout;
 pub use ray_query::{MaskError, RayQuery};
 pub use refit::{RefitError, RefitReport};
+pub use render_space::RenderSpace;
 pub use stored_mesh::{
     PageSink, PageSource, PageUse, StoredMesh, StoredMeshError, StoredMeshReport, StoredMeshWriter,
 };

@@ -11,8 +11,9 @@ use super::instance_filter::InstanceFilter;
 use super::layout::wide::{ChildRef, Unit, WideBvh};
 use super::mesh_group::MeshGroup;
 use super::options::{BuildOptions, BuildReport, Robustness};
-use super::placement::{ORDINARY_LENGTHS, Placement, distance_to_sphere};
+use super::placement::{ORDINARY_LENGTHS, Placement};
 use super::query::{AnyHit, ClosestHit, FastTest, TriangleTest, WatertightTest};
+use super::render_space::RenderSpace;
 use super::top_level::{TopLevel, build_top_level};
 use crate::bvh::traverse::single::{LeafTest, RaySetup, inflate_t, traverse};
 use crate::bvh::traverse::tree_view::TreeView;
@@ -152,7 +153,7 @@ impl World {
 
     /// Render-space point of a world point.
     pub fn render_from_world(&self, p: DVec3) -> Vec3 {
-        (p - self.origin).as_vec3()
+        self.render_space().point(p)
     }
 
     /// A render-space ray from f64 world coordinates. An origin far outside the bounds is first
@@ -160,15 +161,12 @@ impl World {
     /// camera 10⁹ away loses no accuracy. Returns the ray and how far its origin was moved (add it
     /// to a hit's `t`). `dir` need not be of unit length.
     pub fn ray_from_world(&self, origin: DVec3, dir: DVec3) -> (Ray, f64) {
-        let o = origin - self.origin;
-        let moved = if self.bounds.is_empty() {
-            0.0
-        } else {
-            let (center, radius) = (self.bounds.center().as_dvec3(), self.bounds.radius() as f64);
-            let far = (o - center).abs().max_element() > 64.0 * radius;
-            if far { distance_to_sphere(o, dir, center, radius) } else { 0.0 }
-        };
-        (Ray::new((o + dir * moved).as_vec3(), dir.as_vec3()), moved)
+        self.render_space().ray(origin, dir)
+    }
+
+    /// The shift to render space, to be had once for many rays or points.
+    pub fn render_space(&self) -> RenderSpace {
+        RenderSpace::new(self.origin, self.bounds)
     }
 
     /// The closest hit along `ray`. Ties (coplanar layers) go to the lowest instance, then the
