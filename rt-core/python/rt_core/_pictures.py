@@ -6,7 +6,7 @@ import numpy as np
 
 from rt_core import _arrays, _png
 from rt_core._camera import Camera, seen_from_outside
-from rt_core._rt_core import Stage
+from rt_core._rt_core import Stage, exr_bytes
 
 #: Viridis at nine places, linear between, as sRGB.
 VIRIDIS = (
@@ -351,10 +351,44 @@ class Picture:
     warnings: tuple
 
     def save(self, path):
-        """Writes a PNG file."""
-        if not str(path).lower().endswith(".png"):
-            raise ValueError(f"path is {str(path)!r}; give a name that ends with .png")
-        _png.write(path, self.rgba8)
+        """Writes a file.
+
+        Parameters
+        ----------
+        path : path-like
+            ``.png`` for viewing; ``.exr`` with all layers as they are: `color` as R, G, B, A, and
+            depth.Z, distance.Z, normal.X, normal.Y, normal.Z, id.instance (of `object`) and
+            id.primitive, each with its unit as the attribute ``unit.NAME``.
+        """
+        ending = str(path).lower().rsplit(".", 1)[-1]
+        if ending not in ("png", "exr"):
+            raise ValueError(f"path is {str(path)!r}; give a name that ends with .png or .exr")
+        if ending == "png":
+            _png.write(path, self.rgba8)
+            return
+        height, width = self.depth.shape
+        data = exr_bytes((width, height), self._channels(), "rt_core")
+        with open(path, "wb") as file:
+            file.write(data)
+
+    def _channels(self):
+        """Name, unit and numbers of each channel of an OpenEXR file."""
+        ids = "index, 4294967295 for none"
+        axes = "unit vector, world axes"
+        linear = "linear, premultiplied"
+        layers = [
+            (("R", "G", "B", "A"), (linear, linear, linear, "coverage 0..1"), self.color),
+            (("depth.Z",), ("OpenGL window depth 0..1",), self.depth[..., None]),
+            (("distance.Z",), ("world units from the eye",), self.distance[..., None]),
+            (("normal.X", "normal.Y", "normal.Z"), (axes,) * 3, self.normal),
+            (("id.instance",), (ids,), self.object[..., None]),
+            (("id.primitive",), (ids,), self.primitive[..., None]),
+        ]
+        return [
+            (name, unit, np.ascontiguousarray(values[..., i]).reshape(-1))
+            for names, units, values in layers
+            for i, (name, unit) in enumerate(zip(names, units))
+        ]
 
 
 def _size(size):

@@ -5,6 +5,11 @@ NO_HIT: int
 
 def count_threads() -> int: ...
 def count_stopped_calls() -> int: ...
+def exr_bytes(
+    size: tuple[int, int],
+    channels: list[tuple[str, str, NDArray[np.float32] | NDArray[np.uint32]]],
+    software: str,
+) -> bytes: ...
 
 class World:
     triangles: int

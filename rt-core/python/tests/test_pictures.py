@@ -120,6 +120,34 @@ def test_png_files_have_the_picture(tmp_path):
         shown.save(tmp_path / "ball.jpg")
 
 
+def test_exr_files_have_every_layer_with_its_unit(tmp_path):
+    """As the reader of the format's authors sees it."""
+    openexr = pytest.importorskip("OpenEXR")
+    near, far = rt_core.Spheres([[0, 0, 0]], 1.0), rt_core.Spheres([[1, 3, 0]], 1.0)
+    shown = picture(near, far, samples=4)
+    shown.save(tmp_path / "ball.EXR")
+    with openexr.File(str(tmp_path / "ball.EXR"), separate_channels=True) as file:
+        # The file clears its own when it is closed.
+        header = dict(file.header())
+        channels = {name: channel.pixels for name, channel in file.channels().items()}
+    layers = {"RGBA": shown.color, "depth.Z": shown.depth[..., None]}
+    layers |= {"distance.Z": shown.distance[..., None], "id.instance": shown.object[..., None]}
+    layers |= {"id.primitive": shown.primitive[..., None]}
+    layers |= {f"normal.{axis}": shown.normal[..., i : i + 1] for i, axis in enumerate("XYZ")}
+    found = 0
+    for name, values in layers.items():
+        for i, channel in enumerate(name if name == "RGBA" else [name]):
+            pixels = channels[channel]
+            assert pixels.dtype == values.dtype
+            np.testing.assert_array_equal(pixels, values[..., i])
+            assert header[f"unit.{channel}"]
+            found += 1
+    assert found == len(channels) and set(shown.object.flat) == {0, 1, rt_core.NO_HIT}
+    assert header["unit.distance.Z"] == "world units from the eye"
+    with pytest.raises(OSError):
+        shown.save(tmp_path / "missing" / "ball.exr")
+
+
 GRID = np.zeros((3, 3, 3))
 
 

@@ -46,7 +46,7 @@ pub(super) const PACKAGES: &[Package] = &[
         builder: Builder::Maturin,
         alone_with: &["numpy"],
         // Open3D is not here: its wheel has 400 MB.
-        adapted: &["trimesh", "rtree", "scipy", "embreex", "pyvista", "matplotlib"],
+        adapted: &["trimesh", "rtree", "scipy", "embreex", "pyvista", "matplotlib", "OpenEXR"],
         others: &[&[]],
         reference: Some(Reference {
             target: &["--example", "bits"],
