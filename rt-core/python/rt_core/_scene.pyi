@@ -68,6 +68,7 @@ class Scene:
         *,
         t_min: float = 0.0,
         t_max: ArrayLike | None = None,
+        normals: bool = True,
         out: Hits | None = None,
         threads: int | None = None,
     ) -> Hits: ...

@@ -151,7 +151,7 @@ def multi_ray_trace(mesh, origins, directions, first_point=False, retry=False):
     directions = np.asarray(directions, dtype=np.float64)
     surface = surface_of(mesh)
     if first_point:
-        hits = surface.scene.cast(origins, directions)
+        hits = surface.scene.cast(origins, directions, normals=False)
         rays = np.flatnonzero(hits.hit)
         t, primitive, uv = hits.t[rays], hits.primitive[rays], hits.uv[rays]
     else:

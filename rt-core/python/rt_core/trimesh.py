@@ -35,7 +35,7 @@ def install():
 
 
 def _rows(name, values):
-    array = np.array(values, dtype=np.float64)
+    array = np.asarray(values, dtype=np.float64)
     if array.size % 3 or array.ndim > 2 or (array.ndim == 2 and array.size and array.shape[1] != 3):
         raise ValueError(f"{name} has shape {array.shape}; give (n, 3)")
     return array.reshape(-1, 3)
@@ -70,7 +70,7 @@ class RayMeshIntersector:
         return self._built[1]
 
     def _rays(self, ray_origins, ray_directions):
-        """Rays with directions of unit length, and which of them can be cast."""
+        """Rays that can be cast, their numbers (None: all of them), and how many there are."""
         origins = _rows("ray_origins", ray_origins)
         directions = _rows("ray_directions", ray_directions)
         if origins.shape != directions.shape:
@@ -78,8 +78,12 @@ class RayMeshIntersector:
                 f"ray_origins has {len(origins)} rows and ray_directions has {len(directions)}; "
                 "give as many of both"
             )
-        lengths = np.linalg.norm(directions, axis=1, keepdims=True)
+        # Most calls are cast as they are.
+        squares = np.einsum("ij,ij->i", directions, directions)
+        if ((squares > 1e-30) & (squares < 1e30)).all() and np.isfinite(origins).all():
+            return origins, directions, None, len(origins)
         # trimesh answers rays without a direction with a miss.
+        lengths = np.linalg.norm(directions, axis=1, keepdims=True)
         usable = np.isfinite(origins).all(axis=1) & (lengths[:, 0] > 0) & np.isfinite(lengths[:, 0])
         numbers = np.flatnonzero(usable)
         return origins[usable], directions[usable] / lengths[usable], numbers, len(origins)
@@ -115,18 +119,20 @@ class RayMeshIntersector:
         if multiple_hits:
             hits = scene.all_hits(origins, directions)
             rays, t, triangles = hits.ray, hits.t, hits.primitive.astype(np.int64)
-            rank = np.arange(len(t)) - hits.starts[rays]
-            kept = rank < max_hits
-            rays, t, triangles, uv = rays[kept], t[kept], triangles[kept], hits.uv[kept]
+            uv = hits.uv
+            if np.diff(hits.starts).max(initial=0) > max_hits:
+                kept = np.arange(len(t)) - hits.starts[rays] < max_hits
+                rays, t, triangles, uv = rays[kept], t[kept], triangles[kept], uv[kept]
         else:
-            hits = scene.cast(origins, directions)
+            hits = scene.cast(origins, directions, normals=False)
             rays = np.flatnonzero(hits.hit)
             t, triangles = hits.t[rays], hits.primitive[rays].astype(np.int64)
             uv = hits.uv[rays]
+        given = rays if numbers is None else numbers[rays]
         if not return_locations:
-            return triangles, numbers[rays]
+            return triangles, given
         locations = self._locations(origins[rays], directions[rays], t, triangles, uv)
-        return triangles, numbers[rays], locations
+        return triangles, given, locations
 
     def _locations(self, origins, directions, t, triangles, uv):
         """Where rays meet the planes of their triangles, in float64."""
@@ -150,16 +156,22 @@ class RayMeshIntersector:
     def intersects_first(self, ray_origins, ray_directions):
         """The first triangle of each ray, -1 for none."""
         origins, directions, numbers, count = self._rays(ray_origins, ray_directions)
+        hits = self._scene.cast(origins, directions, normals=False)
+        first = np.where(hits.hit, hits.primitive.astype(np.int64), -1)
+        if numbers is None:
+            return first
         found = np.full(count, -1, dtype=np.int64)
-        hits = self._scene.cast(origins, directions)
-        found[numbers[hits.hit]] = hits.primitive[hits.hit]
+        found[numbers] = first
         return found
 
     def intersects_any(self, ray_origins, ray_directions):
         """Whether each ray hits the mesh."""
         origins, directions, numbers, count = self._rays(ray_origins, ray_directions)
+        occluded = self._scene.occluded(origins, directions)
+        if numbers is None:
+            return occluded
         found = np.zeros(count, dtype=bool)
-        found[numbers] = self._scene.occluded(origins, directions)
+        found[numbers] = occluded
         return found
 
     def contains_points(self, points):

@@ -5,7 +5,10 @@
 //! leaves it, and the interpreter is free while rays are traced.
 #![deny(unsafe_code)]
 
+mod exr_file;
+mod lists;
 mod methods;
+mod normals;
 mod queries;
 mod rays;
 mod stage;
@@ -17,6 +20,8 @@ use pyo3::prelude::*;
 /// What `rt_core`'s Python files import.
 #[pymodule]
 mod _rt_core {
+    #[pymodule_export]
+    use super::exr_file::exr_bytes;
     #[pymodule_export]
     use super::stage::Stage;
     #[pymodule_export]

@@ -1,6 +1,7 @@
 //! What Python sees of the class `World`.
 
-use crate::queries::{Any, Closest, Lists, RayArrays};
+use crate::lists::Lists;
+use crate::queries::{Any, Closest, RayArrays};
 use crate::world::{MeshArrays, World};
 use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::PyTypeError;
@@ -138,9 +139,8 @@ impl World {
         points: &Any<'_>,
         threads: usize,
     ) -> PyResult<Bound<'py, PyArray1<bool>>> {
-        let inside = |p: Vec3| !self.world.instances_around(p).is_empty();
-        let found = for_type_of!(points, T => self.points::<T, _>(py, points, threads, inside))?;
-        Ok(PyArray1::from_iter(py, found.into_iter().map(|f| f == Some(true))))
+        let inside = for_type_of!(points, T => self.enclosed_points::<T>(py, points, threads))?;
+        Ok(PyArray1::from_vec(py, inside))
     }
 
     fn signed_distance<'py>(

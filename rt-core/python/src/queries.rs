@@ -1,5 +1,6 @@
 //! Questions about many rays or points at once.
 
+use crate::normals::write_normals;
 use crate::rays::{FirstFault, Rays, Real, row};
 use crate::work::{Length, Stop, run};
 use crate::world::{Corners, World};
@@ -11,16 +12,16 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use rayon::prelude::*;
 use rt_core::glam::Vec3;
-use rt_core::ray::{Hit, HitBlock, LANES, NO_HIT, Ray, RayBlock};
+use rt_core::ray::{Hit, HitBlock, LANES, NO_HIT, RayBlock};
 
 /// Rays that a thread takes at a time. Answers do not depend on it.
-const CHUNK: usize = 1024;
+pub(crate) const CHUNK: usize = 1024;
 /// Calls with fewer rays or points are short.
 const MANY: usize = 1 << 14;
 
 pub(crate) type Any<'py> = Bound<'py, PyAny>;
 
-fn length_of(rows: usize) -> Length {
+pub(crate) fn length_of(rows: usize) -> Length {
     if rows < MANY { Length::Short } else { Length::Long }
 }
 
@@ -49,7 +50,7 @@ impl<'py, T: Real> RayArrays<'py, T> {
         })
     }
 
-    fn rays(&self) -> PyResult<Rays<'_, T>> {
+    pub(crate) fn rays(&self) -> PyResult<Rays<'_, T>> {
         let (origins, directions) = (self.origins.as_slice()?, self.directions.as_slice()?);
         let t_max = self.t_max.as_ref().map_or(Ok(&[][..]), |t| t.as_slice())?;
         let rays = origins.len() / 3;
@@ -63,27 +64,30 @@ impl<'py, T: Real> RayArrays<'py, T> {
     }
 }
 
+/// One pair of neighbours in this many is looked at.
+const BETWEEN_PAIRS: usize = 8;
+
 /// Whether neighbouring rays go nearly the same way, so that packets pay. Answers do not depend on
 /// it.
-fn are_coherent(rays: &[Ray]) -> bool {
-    let similar = |pair: &[Ray]| {
-        let (a, b) = (pair[0].dir, pair[1].dir);
+fn are_coherent(blocks: &[RayBlock]) -> bool {
+    let similar = |first: usize, b: &RayBlock| {
+        let [a, b] = [first, first + 1].map(|lane| b.get(lane).dir);
         a.dot(b) > 0.99 * (a.length_squared() * b.length_squared()).sqrt()
     };
-    let all = rays.windows(2);
-    let count = all.len();
-    8 * all.filter(|pair| similar(pair)).count() >= 7 * count
+    let pairs = blocks.iter().flat_map(|b| (0..LANES).step_by(BETWEEN_PAIRS).map(move |i| (i, b)));
+    let count = pairs.clone().count();
+    8 * pairs.filter(|(i, b)| similar(*i, b)).count() >= 7 * count
 }
 
 /// A thread's part of the rays.
-struct Chunk {
-    blocks: Vec<RayBlock>,
+pub(crate) struct Chunk {
+    pub(crate) blocks: Vec<RayBlock>,
     coherent: bool,
 }
 
 impl Chunk {
     /// The rays from number `first` on; their origins' ways along them go to `moved`.
-    fn of<T: Real>(
+    pub(crate) fn of<T: Real>(
         world: &World,
         rays: &Rays<'_, T>,
         first: usize,
@@ -91,20 +95,20 @@ impl Chunk {
         moved: &mut Vec<f64>,
         fault: &FirstFault,
     ) -> Chunk {
-        let mut list = Vec::with_capacity(count);
+        let space = world.world.render_space();
+        let mut blocks = vec![RayBlock::INACTIVE; count.div_ceil(LANES)];
         moved.clear();
-        for i in first..first + count {
-            let Some((ray, way)) = rays.get(&world.world, i) else {
-                fault.note(i);
+        for i in 0..count {
+            let Some((ray, way)) = rays.get(&space, first + i) else {
                 // It meets nothing, and its call ends with an error.
-                list.push(Ray::new(Vec3::ZERO, Vec3::X).with_t_max(-1.0));
+                fault.note(first + i);
                 moved.push(0.0);
                 continue;
             };
-            list.push(ray);
+            blocks[i / LANES].set(i % LANES, &ray);
             moved.push(way);
         }
-        Chunk { coherent: are_coherent(&list), blocks: RayBlock::from_rays(&list) }
+        Chunk { coherent: are_coherent(&blocks), blocks }
     }
 
     fn closest(&self, world: &World, hits: &mut [HitBlock]) {
@@ -152,7 +156,7 @@ fn answers2<'a, T: Element>(
 
 impl World {
     /// The number of a hit's triangle among those of all meshes.
-    fn number(&self, hit: &Hit) -> u32 {
+    pub(crate) fn number(&self, hit: &Hit) -> u32 {
         self.firsts[hit.instance as usize] + hit.prim
     }
 
@@ -170,7 +174,10 @@ impl World {
         let mut uv = out.2.cast::<PyArray2<f32>>()?.try_readwrite()?;
         let mut normal = out.3.cast::<PyArray2<f32>>()?.try_readwrite()?;
         let (t, primitive) = (answers(&mut t, rows)?, answers(&mut primitive, rows)?);
-        let (uv, normal) = (answers2(&mut uv, rows, 2)?, answers2(&mut normal, rows, 3)?);
+        let uv = answers2(&mut uv, rows, 2)?;
+        // No rows where no normals are wanted.
+        let wanted = normal.as_slice()?.len().min(1) * rows;
+        let normal = answers2(&mut normal, wanted, 3)?;
         let borrowed = self.borrow(py)?;
         let corners: Vec<Corners<'_>> =
             borrowed.iter().map(|b| b.corners()).collect::<PyResult<_>>()?;
@@ -178,27 +185,31 @@ impl World {
         let work = |stop: &Stop| {
             let parts = t.par_chunks_mut(CHUNK).zip(primitive.par_chunks_mut(CHUNK));
             let parts = parts.zip(uv.as_chunks_mut::<2>().0.par_chunks_mut(CHUNK));
-            let parts = parts.zip(normal.as_chunks_mut::<3>().0.par_chunks_mut(CHUNK));
+            let normals = normal.as_chunks_mut::<3>().0.par_chunks_mut(CHUNK).map(Some);
+            let none = rayon::iter::repeat_n((), rows.div_ceil(CHUNK) - normals.len());
+            let parts = parts.zip(normals.chain(none.map(|()| None)));
             let scratch = || (Vec::new(), Vec::new());
             let trace = |(moved, hits): &mut (Vec<f64>, Vec<HitBlock>), (k, part)| {
                 if stop.is_asked() {
                     return;
                 }
                 let (((t, primitive), uv), normal): (((&mut [T], &mut [u32]), _), _) = part;
-                let (uv, normal): (&mut [[f32; 2]], &mut [[f32; 3]]) = (uv, normal);
+                let (uv, normal): (&mut [[f32; 2]], Option<&mut [[f32; 3]]>) = (uv, normal);
                 let chunk = Chunk::of(self, &rays, k * CHUNK, t.len(), moved, &fault);
                 hits.resize(chunk.blocks.len(), HitBlock::MISS);
                 chunk.closest(self, hits);
                 for i in 0..t.len() {
                     let Some(hit) = hits[i / LANES].get(i % LANES) else {
                         t[i] = T::nearest(f64::INFINITY);
-                        (primitive[i], uv[i], normal[i]) = (NO_HIT, [0.0; 2], [0.0; 3]);
+                        (primitive[i], uv[i]) = (NO_HIT, [0.0; 2]);
                         continue;
                     };
                     t[i] = T::nearest(f64::from(hit.t) + moved[i]);
                     primitive[i] = self.number(&hit);
                     uv[i] = [hit.u, hit.v];
-                    normal[i] = corners[hit.instance as usize].normal(hit.prim).to_array();
+                }
+                if let Some(normal) = normal {
+                    write_normals(&corners, hits, normal);
                 }
             };
             parts.enumerate().for_each_init(scratch, trace);
@@ -250,94 +261,55 @@ impl World {
         let out = answers(&mut out, rays.len())?;
         let fault = FirstFault::none();
         let work = |stop: &Stop| {
-            out.par_iter_mut().with_min_len(64).enumerate().for_each(|(i, out)| {
+            let trace = |(moved, counts): &mut (Vec<f64>, Vec<[u32; LANES]>),
+                         (k, out): (usize, &mut [u32])| {
                 if stop.is_asked() {
                     return;
                 }
-                match rays.get(&self.world, i) {
-                    Some((ray, _)) => *out = self.world.count_hits(&ray) as u32,
-                    None => fault.note(i),
-                }
-            });
+                let chunk = Chunk::of(self, &rays, k * CHUNK, out.len(), moved, &fault);
+                counts.resize(chunk.blocks.len(), [0; LANES]);
+                let traced = self.world.count_hits_of_blocks(&chunk.blocks, counts);
+                debug_assert!(traced.is_ok(), "as many blocks of counts as of rays");
+                out.copy_from_slice(&counts.as_flattened()[..out.len()]);
+            };
+            let parts = out.par_chunks_mut(CHUNK).enumerate();
+            parts.for_each_init(|| (Vec::new(), Vec::new()), trace);
         };
         run(py, threads, length_of(rays.len()), work)?;
         fault.get().map_or(Ok(()), |i| Err(rays.error(i)))
     }
 
-    pub(crate) fn list_rays<'py, T: Real>(
+    /// Whether a mesh encloses each point.
+    pub(crate) fn enclosed_points<T: Real>(
         &self,
-        py: Python<'py>,
-        arrays: &RayArrays<'_, T>,
-        limit: usize,
+        py: Python<'_>,
+        points: &Any<'_>,
         threads: usize,
-    ) -> PyResult<Lists<'py>> {
-        let rays = arrays.rays()?;
-        let rows = rays.len();
+    ) -> PyResult<Vec<bool>> {
+        let points = points.cast::<PyArray2<T>>()?.try_readonly()?;
+        let points = points.as_slice()?;
+        let mut inside = vec![false; points.len() / 3];
         let fault = FirstFault::none();
-        let full = FirstFault::none();
         let work = |stop: &Stop| {
-            let list = |k: usize| {
-                let mut part = Part::default();
-                for i in k * CHUNK..rows.min((k + 1) * CHUNK) {
-                    let unusable = stop.is_asked() || full.get().is_some();
-                    let Some((ray, moved)) = rays.get(&self.world, i).filter(|_| !unusable) else {
-                        if !unusable {
-                            fault.note(i);
-                        }
-                        part.counts.push(0);
-                        continue;
-                    };
-                    let Ok(hits) = self.world.all_hits(&ray, limit) else {
-                        full.note(i);
-                        part.counts.push(0);
-                        continue;
-                    };
-                    part.counts.push(hits.len());
-                    for hit in &hits {
-                        part.t.push(T::nearest(f64::from(hit.t) + moved));
-                        part.primitive.push(self.number(hit));
-                        part.uv.extend([hit.u, hit.v]);
-                    }
+            let look = |places: &mut Vec<Vec3>, (k, inside): (usize, &mut [bool])| {
+                if stop.is_asked() {
+                    return;
                 }
-                part
+                places.clear();
+                places.extend((0..inside.len()).map(|i| {
+                    let point = row(points, k * CHUNK + i);
+                    if !point.is_finite() {
+                        fault.note(k * CHUNK + i);
+                    }
+                    self.world.render_from_world(point)
+                }));
+                let looked = self.world.encloses(places, inside);
+                debug_assert!(looked.is_ok(), "as many answers as points");
             };
-            (0..rows.div_ceil(CHUNK)).into_par_iter().map(list).collect::<Vec<Part<T>>>()
+            inside.par_chunks_mut(CHUNK).enumerate().for_each_init(Vec::new, look);
         };
-        let parts = run(py, threads, length_of(rows), work)?;
-        if let Some(i) = fault.get() {
-            return Err(rays.error(i));
-        }
-        let all: usize = parts.iter().map(|p| p.primitive.len()).sum();
-        if let Some(what) = full
-            .get()
-            .map(|i| format!("ray {i} alone has"))
-            .or_else(|| (all > limit).then(|| format!("{rows} rays have {all} hits,")))
-        {
-            return Err(PyValueError::new_err(format!(
-                "{what} more than max_hits = {limit}; raise max_hits, cast fewer rays in one \
-                 call, or use count()"
-            )));
-        }
-        let mut starts = Vec::with_capacity(rows + 1);
-        let mut sum = 0i64;
-        starts.push(sum);
-        for count in parts.iter().flat_map(|p| &p.counts) {
-            sum += *count as i64;
-            starts.push(sum);
-        }
-        let (mut t, mut primitive) = (Vec::with_capacity(all), Vec::with_capacity(all));
-        let mut uv = Vec::with_capacity(2 * all);
-        for part in parts {
-            t.extend(part.t);
-            primitive.extend(part.primitive);
-            uv.extend(part.uv);
-        }
-        Ok((
-            PyArray1::from_vec(py, starts),
-            PyArray1::from_vec(py, t).into_any(),
-            PyArray1::from_vec(py, primitive),
-            PyArray1::from_vec(py, uv),
-        ))
+        run(py, threads, length_of(points.len() / 3), work)?;
+        fault.get().map_or(Ok(inside), |i| Err(not_finite(points, i)))
     }
 
     pub(crate) fn points<T: Real, A: Send>(
@@ -362,26 +334,17 @@ impl World {
             (0..rows).into_par_iter().with_min_len(32).map(one).collect()
         };
         let found = run(py, threads, length_of(rows), work)?;
-        match fault.get() {
-            None => Ok(found),
-            Some(i) => {
-                let p = row(points, i);
-                Err(PyValueError::new_err(format!(
-                    "points[{i}] is [{:?}, {:?}, {:?}]; give finite numbers",
-                    p.x, p.y, p.z
-                )))
-            }
-        }
+        fault.get().map_or(Ok(found), |i| Err(not_finite(points, i)))
     }
 }
 
-/// Starts of the lists, t, primitive, and u, v in turns.
-pub(crate) type Lists<'py> = (
-    Bound<'py, PyArray1<i64>>,
-    Bound<'py, PyAny>,
-    Bound<'py, PyArray1<u32>>,
-    Bound<'py, PyArray1<f32>>,
-);
+/// The error that names point `i`.
+fn not_finite<T: Real>(points: &[T], i: usize) -> PyErr {
+    let p = row(points, i);
+    let numbers = format!("[{:?}, {:?}, {:?}]", p.x, p.y, p.z);
+    PyValueError::new_err(format!("points[{i}] is {numbers}; give finite numbers"))
+}
+
 /// Points, distances, primitives, and u, v in turns.
 pub(crate) type Closest<'py> = (
     Bound<'py, PyArray1<f64>>,
@@ -389,17 +352,3 @@ pub(crate) type Closest<'py> = (
     Bound<'py, PyArray1<u32>>,
     Bound<'py, PyArray1<f32>>,
 );
-
-/// The lists of a chunk's rays.
-struct Part<T> {
-    counts: Vec<usize>,
-    t: Vec<T>,
-    primitive: Vec<u32>,
-    uv: Vec<f32>,
-}
-
-impl<T> Default for Part<T> {
-    fn default() -> Self {
-        Part { counts: Vec::new(), t: Vec::new(), primitive: Vec::new(), uv: Vec::new() }
-    }
-}

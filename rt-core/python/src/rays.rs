@@ -3,8 +3,9 @@
 use numpy::Element;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use rt_core::bvh::RenderSpace;
 use rt_core::glam::DVec3;
-use rt_core::prelude::{Ray, World};
+use rt_core::prelude::Ray;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// `numpy.float32` or `numpy.float64`.
@@ -32,6 +33,7 @@ impl Real for f64 {
 }
 
 /// Row `i` of an array of x, y, z.
+#[inline]
 pub(crate) fn row<T: Real>(rows: &[T], i: usize) -> DVec3 {
     let [x, y, z] = [0, 1, 2].map(|k| rows[3 * i + k].widened());
     DVec3::new(x, y, z)
@@ -52,12 +54,13 @@ impl<T: Real> Rays<'_, T> {
         self.origins.len() / 3
     }
 
-    /// Ray `i` as `world` wants it, and how far its origin was moved; `None` when a number of it
+    /// Ray `i` as a world wants it, and how far its origin was moved; `None` when a number of it
     /// cannot be used.
-    pub(crate) fn get(&self, world: &World, i: usize) -> Option<(Ray, f64)> {
+    #[inline]
+    pub(crate) fn get(&self, space: &RenderSpace, i: usize) -> Option<(Ray, f64)> {
         let (origin, dir) = (row(self.origins, i), row(self.directions, i));
         let t_max = self.t_max.get(i).map_or(f64::INFINITY, |t| t.widened());
-        let (ray, moved) = world.ray_from_world(origin, dir);
+        let (ray, moved) = space.ray(origin, dir);
         let usable = origin.is_finite() && ray.dir.is_finite() && dir != DVec3::ZERO;
         if !usable || t_max.is_nan() {
             return None;

@@ -5,7 +5,7 @@ use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use rt_core::bvh::{BuildError, Robustness};
-use rt_core::glam::{DAffine3, DVec3, Vec3};
+use rt_core::glam::{DAffine3, DVec3};
 use rt_core::mesh::MeshSlices;
 use rt_core::prelude::{BuildOptions, Instance};
 use std::ops::ControlFlow;
@@ -55,13 +55,12 @@ impl Borrowed<'_> {
 }
 
 impl Corners<'_> {
-    /// The unit normal on the side from which the corners are seen counter-clockwise; zero for a
-    /// triangle without area, or of arrays that were changed since the build.
-    pub(crate) fn normal(&self, triangle: u32) -> Vec3 {
-        let at = |k: u32| self.positions.get(k as usize).map(|p| Vec3::from(*p).as_dvec3());
-        let corners = self.triangles.get(triangle as usize).map(|ids| ids.map(at));
-        let Some([Some(a), Some(b), Some(c)]) = corners else { return Vec3::ZERO };
-        (b - a).cross(c - a).normalize_or_zero().as_vec3()
+    /// The corners of a triangle; `None` of arrays that were changed since the build.
+    #[inline]
+    pub(crate) fn triangle(&self, triangle: u32) -> Option<[[f32; 3]; 3]> {
+        let ids = self.triangles.get(triangle as usize)?;
+        let [a, b, c] = ids.map(|k| self.positions.get(k as usize));
+        Some([*a?, *b?, *c?])
     }
 }
 

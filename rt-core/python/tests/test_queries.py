@@ -165,6 +165,21 @@ def test_an_empty_scene_has_no_hits():
     assert len(scene.cast(np.zeros((0, 3)), np.zeros((0, 3))).t) == 0
 
 
+def test_normals_are_optional():
+    vertices, triangles = sphere(16)
+    scene = rt_core.Scene(vertices, triangles)
+    origins, directions = rays(3000)
+    hits = scene.cast(origins, directions)
+    bare = scene.cast(origins, directions, normals=False)
+    assert bare.normal.shape == (0, 3) and hits.hit.any()
+    for name in ("t", "primitive", "uv", "hit"):
+        np.testing.assert_array_equal(getattr(bare, name), getattr(hits, name))
+    again = scene.cast(origins, directions, normals=False, out=bare)
+    assert again.t is bare.t and again.normal is bare.normal
+    with pytest.raises(ValueError, match="normal"):
+        scene.cast(origins, directions, out=bare)
+
+
 def test_no_ray_passes_between_triangles():
     """Rays at the middles of edges and at vertices of a closed mesh (trimesh 1180, embree 387)."""
     vertices, triangles = sphere(64)
