@@ -12,9 +12,17 @@ use std::process::Command;
 /// Arguments of bench: none, which runs the quick form of every experiment.
 pub(crate) const ARGUMENTS: &[&str] = &[];
 
-/// The environment in the build folder that the step `wheels` installs the Python package in, with
-/// the packages that bench compares it with.
+/// The environments in the build folder that the step `wheels` installs the Python packages in, with
+/// the packages that bench compares them with.
 pub(crate) const RT_CORE_PYTHON: &str = "wheels/adapted";
+pub(crate) const SCHLIEREN_PYTHON: &str = "wheels/schlieren";
+pub(crate) const RTVTK_PYTHON: &str = "wheels/rtvtk";
+/// How bench is told.
+const PYTHONS: [(&str, &str); 3] = [
+    ("RTSV_RT_CORE_PYTHON", RT_CORE_PYTHON),
+    ("RTSV_SCHLIEREN_PYTHON", SCHLIEREN_PYTHON),
+    ("RTSV_RTVTK_PYTHON", RTVTK_PYTHON),
+];
 
 /// Runs the program `bench` of the build folder.
 pub(crate) fn run(context: &Context<'_>) -> Outcome {
@@ -32,9 +40,11 @@ pub(crate) fn run(context: &Context<'_>) -> Outcome {
     command.args(ARGUMENTS).current_dir(context.root);
     command.envs(context.peers.environment(context.options.require_peers));
     let build = build_folder(context.root, crate::build_folder_named());
-    let python = build.join(RT_CORE_PYTHON).join("bin/python");
-    if python.is_file() {
-        command.env("RTSV_RT_CORE_PYTHON", python);
+    for (variable, environment) in PYTHONS {
+        let python = build.join(environment).join("bin/python");
+        if python.is_file() {
+            command.env(variable, python);
+        }
     }
     match command.status() {
         Ok(status) if status.success() => Outcome::Passed,

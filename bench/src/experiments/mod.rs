@@ -36,6 +36,9 @@ mod partition_view;
 mod pictures;
 mod program_ranks;
 mod python;
+mod python_process;
+mod python_schlieren;
+mod rtvtk;
 mod shock_angles;
 mod smpi;
 mod speed_gpu;
@@ -218,6 +221,18 @@ pub const ALL: &[Experiment] = &[
         chapter: 4,
         title: "Rays from Python: rt_core against trimesh with Embree, Open3D and PyVista",
         run: python::run,
+    },
+    Experiment {
+        id: "python-schlieren",
+        chapter: 5,
+        title: "The same photograph from Python and by the program",
+        run: python_schlieren::run,
+    },
+    Experiment {
+        id: "rtvtk",
+        chapter: 3,
+        title: "Frames of VTK’s wheel, alone and with rtvtk",
+        run: rtvtk::run,
     },
     Experiment {
         id: "frames",

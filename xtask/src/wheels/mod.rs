@@ -127,10 +127,10 @@ pub(crate) fn run(root: &Path, build: &Path, options: &WheelsOptions) -> Result<
                 0 => package.adapted,
                 _ => package.others[(number - 1) % package.others.len()],
             };
-            let venv = match package.name {
+            let venv = match number {
                 // bench finds it there.
-                "rt_core" if number == 0 => build.join(main_job::RT_CORE_PYTHON),
-                name => work.join(format!("{name} {version}").replace(' ', "-")),
+                0 => build.join(package.environment),
+                _ => work.join(format!("{} {version}", package.name).replace(' ', "-")),
             };
             let venv = environment(&venv, python)?;
             let said = test(package, root, &wheel, reference.as_ref(), &venv, beside)?;

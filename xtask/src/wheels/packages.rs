@@ -1,5 +1,7 @@
 //! The Python packages of the workspace.
 
+use crate::main_job;
+
 /// A Python package of the workspace.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Package {
@@ -14,6 +16,8 @@ pub(super) struct Package {
     /// What the first interpreter gets for the tests, such as the packages that parts of this one
     /// adapt. It is Debian's.
     pub(super) adapted: &'static [&'static str],
+    /// The first interpreter's environment, in the build folder.
+    pub(super) environment: &'static str,
     /// What one of the other interpreters gets, in turns. They test the package alone otherwise.
     pub(super) others: &'static [&'static [&'static str]],
     pub(super) reference: Option<Reference>,
@@ -47,6 +51,7 @@ pub(super) const PACKAGES: &[Package] = &[
         alone_with: &["numpy"],
         // Open3D is not here: its wheel has 400 MB.
         adapted: &["trimesh", "rtree", "scipy", "embreex", "pyvista", "matplotlib", "OpenEXR"],
+        environment: main_job::RT_CORE_PYTHON,
         others: &[&[]],
         reference: Some(Reference {
             target: &["--example", "bits"],
@@ -61,6 +66,7 @@ pub(super) const PACKAGES: &[Package] = &[
         builder: Builder::Maturin,
         alone_with: &["numpy"],
         adapted: &["pyvista", "xarray", "matplotlib", "mpi4py"],
+        environment: main_job::SCHLIEREN_PYTHON,
         others: &[&[]],
         reference: Some(Reference {
             target: &["--bin", "schlieren"],
@@ -76,6 +82,7 @@ pub(super) const PACKAGES: &[Package] = &[
         // VTK's wheel brings matplotlib, and that more.
         alone_with: &[],
         adapted: &["vtk==9.7.2", "pyvista[jupyter]", "nbclient", "ipykernel"],
+        environment: main_job::RTVTK_PYTHON,
         // Each with one of VTK's versions that the package is for.
         others: &[&["vtk==9.4.2"], &["vtk==9.5.2"], &["vtk==9.6.2"]],
         reference: None,
