@@ -66,21 +66,31 @@ fn with_maturin(package: &Package, places: &Places<'_>, profile: &str) -> Result
 }
 
 fn with_backend(package: &Package, places: &Places<'_>, profile: &str) -> Result<(), String> {
-    let mut library = cargo();
-    library.args(["build", "--locked", "--profile", profile, "-p", package.member, "--lib"]);
-    let alone = ["--no-default-features", "--target-dir"];
-    library.args(alone).arg(absolute(places.build)?).current_dir(places.root);
-    run_it(without_debug_info(&mut library))?;
-    // Where the profile `dev` builds.
-    let built = if profile == "dev" { "debug" } else { profile };
     let name = format!("lib{}.so", package.member.replace('-', "_"));
-    let library = absolute(&places.build.join(built).join(name))?;
+    let library = if profile == "dev" {
+        build_tests(places.root)?;
+        absolute(&places.build.join("debug/deps").join(name))?
+    } else {
+        let mut library = cargo();
+        library.args(["build", "--locked", "--profile", profile, "-p", package.member, "--lib"]);
+        let alone = ["--no-default-features", "--target-dir"];
+        library.args(alone).arg(absolute(places.build)?).current_dir(places.root);
+        run_it(without_debug_info(&mut library))?;
+        absolute(&places.build.join(profile).join(name))?
+    };
     let folder = places.root.join(package.folder);
     let mut python = Command::new(absolute(&places.tools.join("bin/python"))?);
     let program = "import backend, sys; print(backend.build_wheel(sys.argv[1])); \
                    print(backend.build_sdist(sys.argv[1]))";
     python.args(["-B", "-c", program]).arg(places.out).env("RTVTK_LIBRARY", library);
     run_it(python.current_dir(folder))
+}
+
+/// Builds what `build-tests` does; nothing is left to do after that step. A single target of it
+/// would have other features of some packages, and rt-core would be compiled once more.
+pub(super) fn build_tests(root: &Path) -> Result<(), String> {
+    let mut cargo = cargo();
+    run_it(cargo.args(["test", "--workspace", "--no-run", "--quiet"]).current_dir(root))
 }
 
 /// Whether auditwheel finds that the wheel keeps to the policy in its name.

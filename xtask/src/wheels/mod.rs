@@ -18,7 +18,7 @@ use crate::step::{Context, Outcome};
 mod make;
 mod packages;
 
-use make::{Places, absolute, cargo, make};
+use make::{Places, absolute, build_tests, cargo, make};
 use packages::{PACKAGES, Package, Reference};
 
 /// What makes wheels of native modules, and what checks them.
@@ -223,15 +223,13 @@ fn reference_program(
     build: &Path,
     profile: &str,
 ) -> Result<PathBuf, String> {
-    let mut cargo = cargo();
     if profile == "dev" {
-        // What `build-tests` has built. A single target of it has other features of some packages,
-        // and rt-core would be compiled once more.
-        cargo.args(["test", "--workspace", "--no-run", "--quiet"]);
+        build_tests(root)?;
     } else {
+        let mut cargo = cargo();
         cargo.args(["build", "--workspace", "--profile", profile]).args(reference.target);
+        run_it(cargo.current_dir(root))?;
     }
-    run_it(cargo.current_dir(root))?;
     // The profile `dev` builds in `debug`.
     let folder = build.join(if profile == "dev" { "debug" } else { profile });
     absolute(&folder.join(reference.path))
