@@ -9,6 +9,7 @@ mod exr_file;
 mod lists;
 mod methods;
 mod normals;
+mod parts;
 mod queries;
 mod rays;
 mod stage;

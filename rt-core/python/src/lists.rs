@@ -1,13 +1,13 @@
 //! All hits of many rays.
 
-use crate::queries::{CHUNK, Chunk, RayArrays, length_of};
+use crate::parts::{for_each, length_of, map, part_size};
+use crate::queries::{Chunk, RayArrays};
 use crate::rays::{FirstFault, Rays, Real};
 use crate::work::{Stop, run};
 use crate::world::World;
 use numpy::PyArray1;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use rayon::prelude::*;
 use rt_core::bvh::HitLists;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -88,14 +88,14 @@ impl World {
         allowance: &Allowance,
         stop: &Stop,
     ) -> Vec<Part> {
-        let rows = rays.len();
+        let (rows, size) = (rays.len(), part_size(rays.len()));
         let list = |k: usize| {
-            let (first, mut moved) = (k * CHUNK, Vec::new());
+            let (first, mut moved) = (k * size, Vec::new());
             let none = Part { lists: HitLists::default(), moved: Vec::new() };
             if stop.is_asked() || allowance.is_spent() {
                 return none;
             }
-            let chunk = Chunk::of(self, rays, first, CHUNK.min(rows - first), &mut moved, fault);
+            let chunk = Chunk::of(self, rays, first, size.min(rows - first), &mut moved, fault);
             match self.world.all_hits_of_blocks(&chunk.blocks, allowance.limit) {
                 Ok(lists) => {
                     allowance.spend(lists.hits().len());
@@ -107,7 +107,7 @@ impl World {
                 }
             }
         };
-        (0..rows.div_ceil(CHUNK)).into_par_iter().map(list).collect()
+        map(rows.div_ceil(size), list)
     }
 
     /// The arrays of the answer: starts, t, primitive, u and v.
@@ -135,19 +135,23 @@ impl World {
             pieces.push((part, first, starts, t, primitive, uv));
             first += hits as i64;
         }
-        pieces.into_par_iter().for_each(|(part, first, starts, t, primitive, uv)| {
-            let ends = &part.lists.starts()[1..];
-            let mut i = 0;
-            for ((start, end), moved) in starts.iter_mut().zip(ends).zip(&part.moved) {
-                *start = first + *end as i64;
-                for hit in &part.lists.hits()[i..*end] {
-                    t[i] = T::nearest(f64::from(hit.t) + moved);
-                    primitive[i] = self.number(hit);
-                    uv[i] = [hit.u, hit.v];
-                    i += 1;
+        for_each(
+            pieces,
+            || (),
+            |(), (part, first, starts, t, primitive, uv)| {
+                let ends = &part.lists.starts()[1..];
+                let mut i = 0;
+                for ((start, end), moved) in starts.iter_mut().zip(ends).zip(&part.moved) {
+                    *start = first + *end as i64;
+                    for hit in &part.lists.hits()[i..*end] {
+                        t[i] = T::nearest(f64::from(hit.t) + moved);
+                        primitive[i] = self.number(hit);
+                        uv[i] = [hit.u, hit.v];
+                        i += 1;
+                    }
                 }
-            }
-        });
+            },
+        );
         (starts, t, primitive, uv)
     }
 }

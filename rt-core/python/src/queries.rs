@@ -1,8 +1,9 @@
 //! Questions about many rays or points at once.
 
 use crate::normals::write_normals;
+use crate::parts::{POINTS, for_each, length_of, length_of_points, map, part_size};
 use crate::rays::{FirstFault, Rays, Real, row};
-use crate::work::{Length, Stop, run};
+use crate::work::{Stop, run};
 use crate::world::{Corners, World};
 use numpy::{
     Element, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
@@ -10,20 +11,10 @@ use numpy::{
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use rayon::prelude::*;
 use rt_core::glam::Vec3;
 use rt_core::ray::{Hit, HitBlock, LANES, NO_HIT, RayBlock};
 
-/// Rays that a thread takes at a time. Answers do not depend on it.
-pub(crate) const CHUNK: usize = 1024;
-/// Calls with fewer rays or points are short.
-const MANY: usize = 1 << 14;
-
 pub(crate) type Any<'py> = Bound<'py, PyAny>;
-
-pub(crate) fn length_of(rows: usize) -> Length {
-    if rows < MANY { Length::Short } else { Length::Long }
-}
 
 /// The arrays of a call's rays.
 pub(crate) struct RayArrays<'py, T: Element> {
@@ -183,11 +174,13 @@ impl World {
             borrowed.iter().map(|b| b.corners()).collect::<PyResult<_>>()?;
         let fault = FirstFault::none();
         let work = |stop: &Stop| {
-            let parts = t.par_chunks_mut(CHUNK).zip(primitive.par_chunks_mut(CHUNK));
-            let parts = parts.zip(uv.as_chunks_mut::<2>().0.par_chunks_mut(CHUNK));
-            let normals = normal.as_chunks_mut::<3>().0.par_chunks_mut(CHUNK).map(Some);
-            let none = rayon::iter::repeat_n((), rows.div_ceil(CHUNK) - normals.len());
-            let parts = parts.zip(normals.chain(none.map(|()| None)));
+            let size = part_size(rows);
+            let parts = t.chunks_mut(size).zip(primitive.chunks_mut(size));
+            let parts = parts.zip(uv.as_chunks_mut::<2>().0.chunks_mut(size));
+            // No rows where no normals are wanted.
+            let normals = normal.as_chunks_mut::<3>().0.chunks_mut(size).map(Some);
+            let normals = normals.chain(std::iter::repeat_with(|| None));
+            let parts = parts.zip(normals).enumerate().collect();
             let scratch = || (Vec::new(), Vec::new());
             let trace = |(moved, hits): &mut (Vec<f64>, Vec<HitBlock>), (k, part)| {
                 if stop.is_asked() {
@@ -195,7 +188,7 @@ impl World {
                 }
                 let (((t, primitive), uv), normal): (((&mut [T], &mut [u32]), _), _) = part;
                 let (uv, normal): (&mut [[f32; 2]], Option<&mut [[f32; 3]]>) = (uv, normal);
-                let chunk = Chunk::of(self, &rays, k * CHUNK, t.len(), moved, &fault);
+                let chunk = Chunk::of(self, &rays, k * size, t.len(), moved, &fault);
                 hits.resize(chunk.blocks.len(), HitBlock::MISS);
                 chunk.closest(self, hits);
                 for i in 0..t.len() {
@@ -212,7 +205,7 @@ impl World {
                     write_normals(&corners, hits, normal);
                 }
             };
-            parts.enumerate().for_each_init(scratch, trace);
+            for_each(parts, scratch, trace);
         };
         run(py, threads, length_of(rows), work)?;
         fault.get().map_or(Ok(()), |i| Err(rays.error(i)))
@@ -228,22 +221,22 @@ impl World {
         let rays = arrays.rays()?;
         let mut out = out.cast::<PyArray1<bool>>()?.try_readwrite()?;
         let out = answers(&mut out, rays.len())?;
-        let fault = FirstFault::none();
+        let (fault, size) = (FirstFault::none(), part_size(rays.len()));
         let work = |stop: &Stop| {
             let trace = |(moved, masks): &mut (Vec<f64>, Vec<u16>),
                          (k, out): (usize, &mut [bool])| {
                 if stop.is_asked() {
                     return;
                 }
-                let chunk = Chunk::of(self, &rays, k * CHUNK, out.len(), moved, &fault);
+                let chunk = Chunk::of(self, &rays, k * size, out.len(), moved, &fault);
                 masks.resize(chunk.blocks.len(), 0);
                 chunk.occluded(self, masks);
                 for (i, o) in out.iter_mut().enumerate() {
                     *o = masks[i / LANES] >> (i % LANES) & 1 == 1;
                 }
             };
-            let parts = out.par_chunks_mut(CHUNK).enumerate();
-            parts.for_each_init(|| (Vec::new(), Vec::new()), trace);
+            let parts = out.chunks_mut(size).enumerate().collect();
+            for_each(parts, || (Vec::new(), Vec::new()), trace);
         };
         run(py, threads, length_of(rays.len()), work)?;
         fault.get().map_or(Ok(()), |i| Err(rays.error(i)))
@@ -259,21 +252,21 @@ impl World {
         let rays = arrays.rays()?;
         let mut out = out.cast::<PyArray1<u32>>()?.try_readwrite()?;
         let out = answers(&mut out, rays.len())?;
-        let fault = FirstFault::none();
+        let (fault, size) = (FirstFault::none(), part_size(rays.len()));
         let work = |stop: &Stop| {
             let trace = |(moved, counts): &mut (Vec<f64>, Vec<[u32; LANES]>),
                          (k, out): (usize, &mut [u32])| {
                 if stop.is_asked() {
                     return;
                 }
-                let chunk = Chunk::of(self, &rays, k * CHUNK, out.len(), moved, &fault);
+                let chunk = Chunk::of(self, &rays, k * size, out.len(), moved, &fault);
                 counts.resize(chunk.blocks.len(), [0; LANES]);
                 let traced = self.world.count_hits_of_blocks(&chunk.blocks, counts);
                 debug_assert!(traced.is_ok(), "as many blocks of counts as of rays");
                 out.copy_from_slice(&counts.as_flattened()[..out.len()]);
             };
-            let parts = out.par_chunks_mut(CHUNK).enumerate();
-            parts.for_each_init(|| (Vec::new(), Vec::new()), trace);
+            let parts = out.chunks_mut(size).enumerate().collect();
+            for_each(parts, || (Vec::new(), Vec::new()), trace);
         };
         run(py, threads, length_of(rays.len()), work)?;
         fault.get().map_or(Ok(()), |i| Err(rays.error(i)))
@@ -289,7 +282,7 @@ impl World {
         let points = points.cast::<PyArray2<T>>()?.try_readonly()?;
         let points = points.as_slice()?;
         let mut inside = vec![false; points.len() / 3];
-        let fault = FirstFault::none();
+        let (fault, size) = (FirstFault::none(), part_size(points.len() / 3));
         let work = |stop: &Stop| {
             let look = |places: &mut Vec<Vec3>, (k, inside): (usize, &mut [bool])| {
                 if stop.is_asked() {
@@ -297,16 +290,16 @@ impl World {
                 }
                 places.clear();
                 places.extend((0..inside.len()).map(|i| {
-                    let point = row(points, k * CHUNK + i);
+                    let point = row(points, k * size + i);
                     if !point.is_finite() {
-                        fault.note(k * CHUNK + i);
+                        fault.note(k * size + i);
                     }
                     self.world.render_from_world(point)
                 }));
                 let looked = self.world.encloses(places, inside);
                 debug_assert!(looked.is_ok(), "as many answers as points");
             };
-            inside.par_chunks_mut(CHUNK).enumerate().for_each_init(Vec::new, look);
+            for_each(inside.chunks_mut(size).enumerate().collect(), Vec::new, look);
         };
         run(py, threads, length_of(points.len() / 3), work)?;
         fault.get().map_or(Ok(inside), |i| Err(not_finite(points, i)))
@@ -331,9 +324,13 @@ impl World {
                 }
                 (!stop.is_asked()).then(|| answer(self.world.render_from_world(point)))
             };
-            (0..rows).into_par_iter().with_min_len(32).map(one).collect()
+            let part = |k: usize| {
+                let rows = k * POINTS..rows.min((k + 1) * POINTS);
+                rows.map(one).collect::<Vec<_>>()
+            };
+            map(rows.div_ceil(POINTS), part).into_iter().flatten().collect::<Vec<_>>()
         };
-        let found = run(py, threads, length_of(rows), work)?;
+        let found = run(py, threads, length_of_points(rows), work)?;
         fault.get().map_or(Ok(found), |i| Err(not_finite(points, i)))
     }
 }

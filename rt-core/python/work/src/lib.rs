@@ -71,7 +71,9 @@ impl Stop {
 /// How long a call may take.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Length {
-    /// A blink: Ctrl-C is looked for after it.
+    /// Shorter than waking a thread: the calling thread does the work.
+    Blink,
+    /// Short: Ctrl-C is looked for after it.
     Short,
     /// Longer: Ctrl-C is looked for meanwhile, on a thread of its own.
     Long,
@@ -92,12 +94,8 @@ impl Workers {
 
     /// A pool of `threads` threads; of as many as the machine has for 0.
     fn pool(&self, _py: Python<'_>, threads: usize) -> PyResult<Arc<ThreadPool>> {
+        check_threads(threads)?;
         let threads = if threads == 0 { count_threads() } else { threads };
-        if threads > MOST_THREADS {
-            return Err(PyValueError::new_err(format!(
-                "threads is {threads}; give 1 to {MOST_THREADS}, or None for all of this machine"
-            )));
-        }
         let mut all = self.pools.lock().unwrap_or_else(PoisonError::into_inner);
         if all.process != std::process::id() {
             // After a fork the threads of the parent's pools do not exist here. To drop a pool
@@ -131,12 +129,17 @@ impl Workers {
         length: Length,
         work: impl FnOnce(&Stop) -> R + Send,
     ) -> PyResult<R> {
-        let pool = self.pool(py, threads)?;
         let stop = Stop::default();
-        let guarded = || catch_unwind(AssertUnwindSafe(|| pool.install(|| work(&stop))));
-        let result = match length {
-            Length::Short => Ok(py.detach(guarded)),
-            Length::Long => watched(py, &stop, guarded),
+        let result = if length == Length::Blink {
+            check_threads(threads)?;
+            Ok(py.detach(|| catch_unwind(AssertUnwindSafe(|| work(&stop)))))
+        } else {
+            let pool = self.pool(py, threads)?;
+            let guarded = || catch_unwind(AssertUnwindSafe(|| pool.install(|| work(&stop))));
+            match length {
+                Length::Long => watched(py, &stop, guarded),
+                Length::Short | Length::Blink => Ok(py.detach(guarded)),
+            }
         };
         if stop.seen.load(Ordering::Relaxed) {
             self.stopped.fetch_add(1, Ordering::Relaxed);
@@ -152,6 +155,15 @@ impl Workers {
             ))
         })
     }
+}
+
+fn check_threads(threads: usize) -> PyResult<()> {
+    if threads <= MOST_THREADS {
+        return Ok(());
+    }
+    Err(PyValueError::new_err(format!(
+        "threads is {threads}; give 1 to {MOST_THREADS}, or None for all of this machine"
+    )))
 }
 
 /// Runs `work` on another thread, while this one looks for Ctrl-C.
