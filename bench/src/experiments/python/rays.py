@@ -9,6 +9,7 @@ does not count: programs ask the same scene many times, and a first call finds t
 package left them. Packages pause before their turns, until the threads of the last one sleep.
 """
 
+import ctypes
 import importlib
 import json
 import os
@@ -289,6 +290,8 @@ def print_memory(name, rings):
     # Everything that a package loads at its first use.
     small = tracer(*mesh(3))
     arrays = mesh(rings)
+    # What the arrays' making has freed would hide growth.
+    ctypes.CDLL(None).malloc_trim(0)
     reset_peak()
     before = of_process(RESIDENT)
     built = tracer(*arrays)
