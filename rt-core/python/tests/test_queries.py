@@ -180,6 +180,32 @@ def test_normals_are_optional():
         scene.cast(origins, directions, out=bare)
 
 
+def test_hits_of_glancing_rays_lie_on_their_triangles():
+    """embree 387: a hit far behind a skinny triangle that the ray passes at half a degree."""
+    rng = np.random.default_rng(7)
+    count = 20_000
+    first = rng.uniform(-300, 300, (count, 3))
+    long_side = rng.normal(size=(count, 3))
+    long_side *= 11 / np.linalg.norm(long_side, axis=1, keepdims=True)
+    short_side = 0.12 * rng.normal(size=(count, 3))
+    corners = np.stack([first, first + long_side, first + 0.9 * long_side + short_side], axis=1)
+    corners = corners.astype(np.float32).astype(np.float64)
+    scene = rt_core.Scene(corners.reshape(-1, 3), np.arange(3 * count).reshape(-1, 3))
+    # Nearly in the plane of one of the triangles, through a point near it.
+    normal = np.cross(long_side, short_side)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    aim = corners.mean(axis=1) + 0.02 * rng.normal(size=(count, 3))
+    way = long_side / 11 + 0.01 * normal + 0.3 * rng.normal(size=(count, 1)) * short_side
+    origins = aim - 400 * way
+    hits = scene.all_hits(origins, way)
+    assert len(hits.t) > 0.3 * count
+    places = origins[hits.ray] + hits.t[:, None] * way[hits.ray]
+    of = corners[hits.primitive]
+    outside = np.maximum(of.min(axis=1) - places, places - of.max(axis=1)).max(axis=1)
+    # Half a degree turns a rounding of the heights, 2e-5, into 100 times as much along the ray.
+    assert outside.max() < 0.02, outside.max()
+
+
 def test_no_ray_passes_between_triangles():
     """Rays at the middles of edges and at vertices of a closed mesh (trimesh 1180, embree 387)."""
     vertices, triangles = sphere(64)

@@ -55,6 +55,32 @@ def test_no_ray_is_lost_at_edges_and_vertices():
     np.testing.assert_array_equal(np.bincount(ray, minlength=len(targets)), 1)
 
 
+def test_rays_to_the_vertices_of_a_larger_box_meet_the_smaller_one():
+    """trimesh 1496: any, first and all agree, along edges and through vertices of both boxes."""
+    small = trimesh.creation.box(extents=[40, 40, 40]).subdivide_to_size(20)
+    large = trimesh.creation.box(extents=[60, 60, 60]).subdivide_to_size(20)
+    ours = RayMeshIntersector(small)
+    origins = np.zeros_like(large.vertices)
+    assert ours.intersects_any(origins, large.vertices).all()
+    assert (ours.intersects_first(origins, large.vertices) >= 0).all()
+    for multiple in (True, False):
+        _, ray = ours.intersects_id(origins, large.vertices, multiple_hits=multiple)
+        np.testing.assert_array_equal(np.sort(ray), np.arange(len(large.vertices)))
+
+
+def test_the_edge_between_two_triangles_is_met():
+    """trimesh 1766 and mitsuba3 1149: rays at points of the diagonal of a square."""
+    mesh = trimesh.Trimesh([[-1, -1, 0], [-1, 1, 0], [1, 1, 0], [1, -1, 0]], [[0, 1, 2], [2, 3, 0]])
+    along = np.linspace(-1, 1, 2001)[1:-1, None]
+    targets = along * [1, 1, 0]
+    for origin in ([0, 0, 1], [0.3, -0.7, 1e-3], [-50, 20, 0.1]):
+        origins = np.broadcast_to(np.array(origin, dtype=float), targets.shape)
+        places, ray, _ = RayMeshIntersector(mesh).intersects_location(origins, targets - origins)
+        # Where a target is rounded off the edge, it lies on one of the triangles.
+        np.testing.assert_array_equal(ray, np.arange(len(targets)))
+        np.testing.assert_allclose(places, targets, atol=1e-6 * (1 + np.abs(origin).max()))
+
+
 def test_the_mesh_may_change_and_travel():
     mesh = trimesh.creation.box()
     mesh.ray = RayMeshIntersector(mesh)
