@@ -24,5 +24,6 @@ class World:
         ],
         quality: str,
         robustness: str,
+        storage: str,
         threads: int,
     ) -> None: ...

@@ -95,6 +95,9 @@ class Scene:
         Effort of the build: more takes longer and makes rays faster.
     robustness : {"watertight", "fast"}
         Whether it is excluded that a ray passes between triangles that share an edge or a vertex.
+    storage : {"plain", "compact"}
+        "compact" takes a quarter of the memory beside the arrays, and rays take longer: up to
+        twice as long where neighbours go the same way, several times elsewhere.
     threads : int, optional
         Threads of the build; all of the machine by default.
 
@@ -114,19 +117,34 @@ class Scene:
     """
 
     def __init__(
-        self, vertices, triangles, *, quality="balanced", robustness="watertight", threads=None
+        self,
+        vertices,
+        triangles,
+        *,
+        quality="balanced",
+        robustness="watertight",
+        storage="plain",
+        threads=None,
     ):
-        self._build([_mesh(vertices, triangles)], quality, robustness, threads)
+        self._build([_mesh(vertices, triangles)], (quality, robustness, storage), threads)
 
     @classmethod
-    def from_meshes(cls, meshes, *, quality="balanced", robustness="watertight", threads=None):
+    def from_meshes(
+        cls,
+        meshes,
+        *,
+        quality="balanced",
+        robustness="watertight",
+        storage="plain",
+        threads=None,
+    ):
         """A scene of several meshes.
 
         Parameters
         ----------
         meshes : sequence of (vertices, triangles)
             As `Scene` takes them. Their triangles are numbered through.
-        quality, robustness, threads
+        quality, robustness, storage, threads
             As of `Scene`.
 
         Returns
@@ -161,17 +179,18 @@ class Scene:
             except (TypeError, ValueError, IndexError) as error:
                 raise type(error)(f"mesh {number}: {error}") from None
         scene = cls.__new__(cls)
-        scene._build(made, quality, robustness, threads)
+        scene._build(made, (quality, robustness, storage), threads)
         return scene
 
-    def _build(self, meshes, quality, robustness, threads):
-        if not isinstance(quality, str) or not isinstance(robustness, str):
-            raise TypeError(f"quality is {quality!r} and robustness {robustness!r}; give words")
+    def _build(self, meshes, options, threads):
+        for name, value in zip(("quality", "robustness", "storage"), options):
+            if not isinstance(value, str):
+                raise TypeError(f"{name} is {value!r}; give a word")
         self._meshes = [(positions, faces, origin) for positions, faces, origin, _ in meshes]
-        self._options = (quality, robustness)
+        self._options = options
         #: What was copied, and why; empty if nothing was.
         self.copied = tuple(text for *_, copied in meshes for text in copied)
-        self._world = World(self._meshes, quality, robustness, _arrays.threads(threads))
+        self._world = World(self._meshes, *options, _arrays.threads(threads))
         self._firsts = np.array(self._world.firsts, dtype=np.int64)
 
     def __reduce__(self):
@@ -433,7 +452,8 @@ def _mesh(vertices, triangles):
 
 def _restore(meshes, options, copied):
     scene = Scene.__new__(Scene)
-    scene._build([(*mesh, []) for mesh in meshes], *options, None)
+    # Scenes that were pickled before there was a choice of storage have two options.
+    scene._build([(*mesh, []) for mesh in meshes], (*options, "plain")[:3], None)
     scene.copied = copied
     return scene
 

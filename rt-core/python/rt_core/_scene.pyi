@@ -6,6 +6,7 @@ from numpy.typing import ArrayLike, NDArray
 
 _Quality = Literal["fast", "balanced", "best"]
 _Robustness = Literal["watertight", "fast"]
+_Storage = Literal["plain", "compact"]
 
 class Hits(NamedTuple):
     t: NDArray[np.floating[Any]]
@@ -38,6 +39,7 @@ class Scene:
         *,
         quality: _Quality = "balanced",
         robustness: _Robustness = "watertight",
+        storage: _Storage = "plain",
         threads: int | None = None,
     ) -> None: ...
     @classmethod
@@ -47,6 +49,7 @@ class Scene:
         *,
         quality: _Quality = "balanced",
         robustness: _Robustness = "watertight",
+        storage: _Storage = "plain",
         threads: int | None = None,
     ) -> Scene: ...
     def __reduce__(self) -> tuple[Any, ...]: ...

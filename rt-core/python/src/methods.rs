@@ -32,9 +32,10 @@ impl World {
         meshes: Vec<MeshArrays<'_>>,
         quality: &str,
         robustness: &str,
+        storage: &str,
         threads: usize,
     ) -> PyResult<World> {
-        World::build(py, meshes, quality, robustness, threads)
+        World::build(py, meshes, quality, robustness, storage, threads)
     }
 
     /// Number of triangles.

@@ -4,7 +4,7 @@ use crate::work::{Length, run};
 use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
-use rt_core::bvh::{BuildError, Robustness};
+use rt_core::bvh::{BuildError, Robustness, Storage};
 use rt_core::glam::{DAffine3, DVec3};
 use rt_core::mesh::MeshSlices;
 use rt_core::prelude::{BuildOptions, Instance};
@@ -83,6 +83,7 @@ impl World {
         meshes: Vec<MeshArrays<'_>>,
         quality: &str,
         robustness: &str,
+        storage: &str,
         threads: usize,
     ) -> PyResult<World> {
         let quality = quality.parse().map_err(|e| PyValueError::new_err(format!("{e}")))?;
@@ -91,7 +92,12 @@ impl World {
             let names = Robustness::ALL.map(Robustness::name).join(" or ");
             PyValueError::new_err(format!("there is no such robustness; give {names}"))
         })?;
-        let options = BuildOptions { quality, robustness, ..BuildOptions::default() };
+        let storage = Storage::ALL.into_iter().find(|s| s.name() == storage);
+        let storage = storage.ok_or_else(|| {
+            let names = Storage::ALL.map(Storage::name).join(" or ");
+            PyValueError::new_err(format!("there is no such storage; give {names}"))
+        })?;
+        let options = BuildOptions { quality, robustness, storage, ..BuildOptions::default() };
         let mut arrays = Vec::with_capacity(meshes.len());
         for (p, t, origin) in &meshes {
             let mesh = Borrowed { positions: p.try_readonly()?, triangles: t.try_readonly()? };

@@ -165,6 +165,27 @@ def test_an_empty_scene_has_no_hits():
     assert len(scene.cast(np.zeros((0, 3)), np.zeros((0, 3))).t) == 0
 
 
+def test_compact_scenes_have_the_bits_of_plain_ones_in_less_memory():
+    vertices, triangles = sphere(128)
+    plain, compact = (
+        rt_core.Scene(vertices, triangles, storage=storage) for storage in ("plain", "compact")
+    )
+    assert compact.nbytes < plain.nbytes / 3
+    origins, directions = rays(3000)
+    again = pickle.loads(pickle.dumps(compact))
+    assert again.nbytes == compact.nbytes
+    for scene in (compact, again):
+        for query in ("cast", "occluded", "count", "all_hits"):
+            found = getattr(scene, query)(origins, directions)
+            expected = getattr(plain, query)(origins, directions)
+            pairs = zip(found, expected) if isinstance(found, tuple) else [(found, expected)]
+            for one, other in pairs:
+                np.testing.assert_array_equal(one, other)
+        points = 0.7 * origins
+        np.testing.assert_array_equal(scene.contains(points), plain.contains(points))
+        np.testing.assert_array_equal(scene.signed_distance(points), plain.signed_distance(points))
+
+
 def test_normals_are_optional():
     vertices, triangles = sphere(16)
     scene = rt_core.Scene(vertices, triangles)

@@ -95,6 +95,10 @@ def test_other_arguments():
         rt_core.Scene(VERTICES, TRIANGLES, quality="good")
     with pytest.raises(ValueError, match="watertight"):
         rt_core.Scene(VERTICES, TRIANGLES, robustness="none")
+    with pytest.raises(ValueError, match="storage; give plain or compact"):
+        rt_core.Scene(VERTICES, TRIANGLES, storage="none")
+    with pytest.raises(TypeError, match="storage is 3"):
+        rt_core.Scene(VERTICES, TRIANGLES, storage=3)
     with pytest.raises(TypeError, match="quality"):
         rt_core.Scene(VERTICES, TRIANGLES, quality=3)
     with pytest.raises(ValueError, match="max_hits = 1"):
