@@ -12,8 +12,8 @@ use std::process::Command;
 /// Arguments of bench: none, which runs the quick form of every experiment.
 pub(crate) const ARGUMENTS: &[&str] = &[];
 
-/// The environments in the build folder that the step `wheels` installs the Python packages in, with
-/// the packages that bench compares them with.
+/// The environments in the build folder that the step `wheels` installs the Python packages in,
+/// with the packages that bench compares them with.
 pub(crate) const RT_CORE_PYTHON: &str = "wheels/adapted";
 pub(crate) const SCHLIEREN_PYTHON: &str = "wheels/schlieren";
 pub(crate) const RTVTK_PYTHON: &str = "wheels/rtvtk";

@@ -54,8 +54,9 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         "kind",
         "",
         "importing beyond numpy; from Ctrl-C to the end of a call; building; the first hit of each \
-         ray; all hits of each ray; rays from inside a closed mesh to its vertices and edges; memory of a mesh's structures, beyond the arrays that the \
-         caller has, and the most while they are built",
+         ray; all hits of each ray; rays from inside a closed mesh to its vertices and edges; \
+         memory of a mesh's structures, beyond the arrays that the caller has, and the most while \
+         they are built",
     );
     record.column("triangles", "", "triangles of the mesh");
     record.column("rays", "", "rays of one call");

@@ -194,8 +194,8 @@ impl World {
     /// let world =
     ///     World::from_mesh(TriMesh::new(corners, vec![[0, 1, 2]]), &BuildOptions::default())?;
     /// let ray = |x: f32| Ray::new(Vec3::new(x, 0.25, 1.0), Vec3::NEG_Z);
-    /// let mut counts = [[0; 16]];
-    /// world.count_hits_of_blocks(&RayBlock::from_rays(&[ray(5.0), ray(0.25)]), &mut counts).unwrap();
+    /// let (blocks, mut counts) = (RayBlock::from_rays(&[ray(5.0), ray(0.25)]), [[0; 16]]);
+    /// world.count_hits_of_blocks(&blocks, &mut counts).unwrap();
     /// assert_eq!(counts[0][..2], [0, 1]);
     /// # Ok::<(), rt_core::bvh::BuildError>(())
     /// ```
