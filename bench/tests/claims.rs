@@ -110,11 +110,17 @@ fn settings_of_sampling_are_timed_in_turns() {
     }
 }
 
+/// The experiments' Rust files, and those of the experiments that have a folder.
 fn sources() -> Vec<(PathBuf, String)> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/experiments");
-    let files =
-        std::fs::read_dir(folder).expect("experiments").map(|e| e.expect("an entry").path());
-    files.map(|p| (p.clone(), std::fs::read_to_string(p).expect("source"))).collect()
+    let entries = |folder: &Path| -> Vec<PathBuf> {
+        let entries = std::fs::read_dir(folder).expect("experiments");
+        entries.map(|e| e.expect("an entry").path()).collect()
+    };
+    let all = entries(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src/experiments"));
+    let (folders, mut files): (Vec<_>, Vec<_>) = all.into_iter().partition(|p| p.is_dir());
+    files.extend(folders.iter().flat_map(|folder| entries(folder)));
+    files.retain(|p| p.extension().is_some_and(|e| e == "rs"));
+    files.into_iter().map(|p| (p.clone(), std::fs::read_to_string(p).expect("source"))).collect()
 }
 
 /// A ratio that an experiment builds itself could bypass the rule of the verdict: it may only
