@@ -96,8 +96,7 @@ class Scene:
     robustness : {"watertight", "fast"}
         Whether it is excluded that a ray passes between triangles that share an edge or a vertex.
     storage : {"plain", "compact"}
-        "compact" takes a quarter of the memory beside the arrays, and rays take longer: up to
-        twice as long where neighbours go the same way, several times elsewhere.
+        "compact" takes a quarter of the tree's memory, and rays take longer.
     threads : int, optional
         Threads of the build; all of the machine by default.
 
@@ -272,7 +271,7 @@ class Scene:
         t_max : float or array_like of shape (N,), optional
             Hits at or behind it do not count.
         normals : bool
-            Without them `normal` has no rows, and the call takes up to a sixth less time.
+            Without them `normal` has no rows, and the call takes less time.
         out : Hits, optional
             Arrays to write to, as an earlier call returned them.
         threads : int, optional

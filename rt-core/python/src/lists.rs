@@ -36,6 +36,11 @@ impl Allowance {
         self.found.load(Ordering::Relaxed) > self.limit
     }
 
+    /// What is left: no part holds more, so that all together hold at most this for each thread.
+    fn rest(&self) -> usize {
+        self.limit.saturating_sub(self.found.load(Ordering::Relaxed))
+    }
+
     fn spend(&self, hits: usize) {
         let most = usize::MAX - hits;
         let sum = |found: usize| Some(found.min(most) + hits);
@@ -96,7 +101,7 @@ impl World {
                 return none;
             }
             let chunk = Chunk::of(self, rays, first, size.min(rows - first), &mut moved, fault);
-            match self.world.all_hits_of_blocks(&chunk.blocks, allowance.limit) {
+            match self.world.all_hits_of_blocks(&chunk.blocks, allowance.rest()) {
                 Ok(lists) => {
                     allowance.spend(lists.hits().len());
                     Part { lists, moved }

@@ -3,8 +3,8 @@
 use crate::work::Length;
 use rayon::prelude::*;
 
-/// Calls of so few rows run on the thread that calls: to wake another takes 50 µs, as long as some
-/// 300 rays.
+/// Calls of so few rows run on the thread that calls: to wake others takes some 50 µs, and half of
+/// these rows little more.
 const FEW: usize = 1024;
 /// Calls of so many rows take long.
 const MANY: usize = 1 << 14;
@@ -20,7 +20,7 @@ pub(crate) fn part_size(rows: usize) -> usize {
 
 pub(crate) fn length_of(rows: usize) -> Length {
     match rows {
-        0..=FEW => Length::Blink,
+        0..=FEW => Length::Immediate,
         _ if rows < MANY => Length::Short,
         _ => Length::Long,
     }
@@ -31,7 +31,7 @@ pub(crate) const POINTS: usize = 32;
 
 pub(crate) fn length_of_points(points: usize) -> Length {
     match points {
-        0..=POINTS => Length::Blink,
+        0..=POINTS => Length::Immediate,
         _ if points < MANY => Length::Short,
         _ => Length::Long,
     }

@@ -1,6 +1,6 @@
 //! Questions about many rays or points at once.
 
-use crate::normals::write_normals;
+use crate::normals::{unit_normal, write_normals};
 use crate::parts::{POINTS, for_each, length_of, length_of_points, map, part_size};
 use crate::rays::{FirstFault, Rays, Real, row};
 use crate::work::{Stop, run};
@@ -13,6 +13,9 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use rt_core::glam::Vec3;
 use rt_core::ray::{Hit, HitBlock, LANES, NO_HIT, RayBlock};
+
+/// Meshes whose arrays are borrowed before it is known which are hit, in calls of fewer rays.
+const BORROWED_AT_ONCE: usize = 16;
 
 pub(crate) type Any<'py> = Bound<'py, PyAny>;
 
@@ -169,7 +172,9 @@ impl World {
         // No rows where no normals are wanted.
         let wanted = normal.as_slice()?.len().min(1) * rows;
         let normal = answers2(&mut normal, wanted, 3)?;
-        let borrowed = self.borrow(py)?;
+        // To borrow the arrays of very many meshes takes longer than the rays of a short call.
+        let at_once = self.num_meshes() <= rows.max(BORROWED_AT_ONCE);
+        let borrowed = if at_once { self.borrow(py, 0..self.num_meshes())? } else { Vec::new() };
         let corners: Vec<Corners<'_>> =
             borrowed.iter().map(|b| b.corners()).collect::<PyResult<_>>()?;
         let fault = FirstFault::none();
@@ -201,14 +206,58 @@ impl World {
                     primitive[i] = self.number(&hit);
                     uv[i] = [hit.u, hit.v];
                 }
-                if let Some(normal) = normal {
+                if let Some(normal) = normal.filter(|_| at_once) {
                     write_normals(&corners, hits, normal);
                 }
             };
             for_each(parts, scratch, trace);
         };
         run(py, threads, length_of(rows), work)?;
-        fault.get().map_or(Ok(()), |i| Err(rays.error(i)))
+        if let Some(i) = fault.get() {
+            return Err(rays.error(i));
+        }
+        if wanted > 0 && !at_once {
+            self.normals_of_hit_meshes(py, primitive, normal.as_chunks_mut().0, threads)?;
+        }
+        Ok(())
+    }
+
+    /// Writes the normals of triangles by their numbers among those of all meshes, and borrows only
+    /// the arrays of meshes that are hit.
+    fn normals_of_hit_meshes(
+        &self,
+        py: Python<'_>,
+        primitives: &[u32],
+        normals: &mut [[f32; 3]],
+        threads: usize,
+    ) -> PyResult<()> {
+        let mesh_of = |primitive: u32| self.firsts.partition_point(|first| *first <= primitive) - 1;
+        let hit = |primitive: &&u32| **primitive != NO_HIT;
+        let mut meshes: Vec<usize> = primitives.iter().filter(hit).map(|p| mesh_of(*p)).collect();
+        meshes.sort_unstable();
+        meshes.dedup();
+        let borrowed = self.borrow(py, meshes.iter().copied())?;
+        let corners: Vec<Corners<'_>> =
+            borrowed.iter().map(|b| b.corners()).collect::<PyResult<_>>()?;
+        let size = part_size(normals.len());
+        let work = |_: &Stop| {
+            let parts = normals.chunks_mut(size).zip(primitives.chunks(size)).collect();
+            for_each(
+                parts,
+                || (),
+                |(), (normals, primitives): (&mut [[f32; 3]], &[u32])| {
+                    for (normal, primitive) in normals.iter_mut().zip(primitives) {
+                        let found = (*primitive != NO_HIT).then(|| {
+                            let mesh = mesh_of(*primitive);
+                            let at = meshes.binary_search(&mesh).ok()?;
+                            corners[at].triangle(primitive - self.firsts[mesh])
+                        });
+                        *normal = unit_normal(found.flatten().unwrap_or_default());
+                    }
+                },
+            );
+        };
+        run(py, threads, length_of(primitives.len()), work)
     }
 
     pub(crate) fn occluded_rays<T: Real>(

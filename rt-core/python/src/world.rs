@@ -65,14 +65,24 @@ impl Corners<'_> {
 }
 
 impl World {
-    pub(crate) fn borrow<'py>(&self, py: Python<'py>) -> PyResult<Vec<Borrowed<'py>>> {
-        let borrow = |mesh: &Mesh| {
+    pub(crate) fn num_meshes(&self) -> usize {
+        self.meshes.len()
+    }
+
+    /// The arrays of some meshes.
+    pub(crate) fn borrow<'py>(
+        &self,
+        py: Python<'py>,
+        meshes: impl Iterator<Item = usize>,
+    ) -> PyResult<Vec<Borrowed<'py>>> {
+        let borrow = |mesh: usize| {
+            let mesh = &self.meshes[mesh];
             Ok(Borrowed {
                 positions: mesh.positions.bind(py).try_readonly()?,
                 triangles: mesh.triangles.bind(py).try_readonly()?,
             })
         };
-        self.meshes.iter().map(borrow).collect()
+        meshes.map(borrow).collect()
     }
 }
 

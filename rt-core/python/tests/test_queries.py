@@ -186,6 +186,22 @@ def test_compact_scenes_have_the_bits_of_plain_ones_in_less_memory():
         np.testing.assert_array_equal(scene.signed_distance(points), plain.signed_distance(points))
 
 
+def test_normals_of_very_many_meshes_are_those_of_one_mesh():
+    vertices, triangles = sphere(6)
+    rng = np.random.default_rng(4)
+    places = rng.uniform(-1, 1, (300, 1, 3)).astype(np.float32)
+    parts = list(np.float32(0.1) * vertices + places)
+    offsets = (np.arange(len(parts)) * len(vertices))[:, None, None]
+    merged = rt_core.Scene(np.concatenate(parts), (triangles + offsets).reshape(-1, 3))
+    apart = rt_core.Scene.from_meshes([(part, triangles) for part in parts])
+    for count in (1, 500, 5000):
+        origins, directions = rays(count)
+        hits, expected = (scene.cast(origins, directions) for scene in (apart, merged))
+        for name in ("primitive", "t", "normal"):
+            np.testing.assert_array_equal(getattr(hits, name), getattr(expected, name))
+    assert hits.hit.sum() > 1000 and (np.abs(hits.normal).sum(axis=1) > 0).sum() == hits.hit.sum()
+
+
 def test_normals_are_optional():
     vertices, triangles = sphere(16)
     scene = rt_core.Scene(vertices, triangles)

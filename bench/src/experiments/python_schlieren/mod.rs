@@ -78,7 +78,8 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column("process", "s", "from the start of the process to its end, files written");
     record.notes.push(format!(
         "A warm ball in air, density in float32 on a lattice of {WIDTH_M} m; schlieren with a \
-         knife edge, tolerance {TOLERANCE_RAD:e} rad, image and deflection map. Wall time, all threads."
+         knife edge, tolerance {TOLERANCE_RAD:e} rad, image and deflection map. Wall time, all \
+         threads."
     ));
     let python = crate::opengl::find("RTSV_SCHLIEREN_PYTHON", "target/wheels/schlieren/bin/python");
     let beside = std::env::current_exe().ok().map(|p| p.with_file_name("schlieren"));

@@ -1,7 +1,8 @@
 """Draws frames with VTK's wheel while the camera turns, and prints what they took.
 
 One argument, a JSON object: {"scene": name, "tracer": name, "size": pixels, "warm": n,
-"frames": n}. Frames after the first `warm` count as steady. CPU is user and system time of all threads.
+"frames": n}. Frames after the first `warm` count as steady. CPU is user and system time of all
+threads.
 """
 
 import json

@@ -72,7 +72,7 @@ impl Stop {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Length {
     /// Shorter than waking a thread: the calling thread does the work.
-    Blink,
+    Immediate,
     /// Short: Ctrl-C is looked for after it.
     Short,
     /// Longer: Ctrl-C is looked for meanwhile, on a thread of its own.
@@ -130,7 +130,7 @@ impl Workers {
         work: impl FnOnce(&Stop) -> R + Send,
     ) -> PyResult<R> {
         let stop = Stop::default();
-        let result = if length == Length::Blink {
+        let result = if length == Length::Immediate {
             check_threads(threads)?;
             Ok(py.detach(|| catch_unwind(AssertUnwindSafe(|| work(&stop)))))
         } else {
@@ -138,7 +138,7 @@ impl Workers {
             let guarded = || catch_unwind(AssertUnwindSafe(|| pool.install(|| work(&stop))));
             match length {
                 Length::Long => watched(py, &stop, guarded),
-                Length::Short | Length::Blink => Ok(py.detach(guarded)),
+                Length::Short | Length::Immediate => Ok(py.detach(guarded)),
             }
         };
         if stop.seen.load(Ordering::Relaxed) {
