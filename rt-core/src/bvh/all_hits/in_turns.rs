@@ -22,10 +22,10 @@ use crate::ray::{Hit, LANES, RayBlock};
 use crate::stats::{Counter, count};
 use fearless_simd::{Simd, SimdBase, SimdMask, dispatch, f32x8};
 
-/// Number of rays in turns through trees that caches hold: twelve are 7 to 13 % slower.
+/// Number of rays in turns through trees that caches hold: twelve are slower there.
 const IN_TURNS: usize = 8;
-/// The same for larger trees: sixteen are 15 to 18 % faster than eight among one to ten million
-/// triangles. (AMD EPYC, 2 threads.)
+/// The same for larger trees: sixteen take 18 % (a million triangles) and 24 % (ten million) less
+/// time than eight. (The record that `traverse/scattered.rs` names.)
 const IN_TURNS_IF_LARGE: usize = 16;
 /// Larger than the caches of a core, in bytes.
 const LARGE: usize = 16 << 20;
