@@ -17,10 +17,10 @@ use crate::ray::{HitBlock, LANES, RayBlock};
 use fearless_simd::Simd;
 use std::marker::PhantomData;
 
-/// Number of rays in turns. Twelve to closest hits take 6 % (among a million triangles) and 9 % (ten
-/// million) less time than eight, and sixteen no less than twelve. Questions of yes or no keep less
-/// for each ray: sixteen take 17 % and 29 % less. Among 100,000 triangles all are even. (AMD EPYC,
-/// bench/runs/2026-11-27-2core-avx-512-amd-epyc/rays-in-turns-eight-or-more.csv.)
+/// Number of rays in turns. Twelve to closest hits take 6 % (among a million triangles) and 9 %
+/// (ten million) less time than eight, and sixteen no less than twelve. Questions of yes or no keep
+/// less for each ray: sixteen take 17 % and 29 % less. Among 100,000 triangles all are even. (AMD
+/// EPYC, bench/runs/2026-11-27-2core-avx-512-amd-epyc/rays-in-turns-eight-or-more.csv.)
 const CLOSEST_IN_TURNS: usize = 12;
 const ANY_IN_TURNS: usize = 16;
 
