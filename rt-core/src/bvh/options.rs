@@ -148,7 +148,8 @@ pub struct BuildOptions {
     pub quality: BuildQuality,
     /// Edge and vertex behaviour.
     pub robustness: Robustness,
-    /// Instruction set of the traversal kernels; `None` for the best that this machine has.
+    /// Instruction set of the traversal, and of the shading of frames of the world; `None` for the
+    /// best that this machine has. Every one gives the same bits.
     pub simd: Option<crate::simd::SimdLevel>,
     /// Memory against time.
     pub storage: Storage,

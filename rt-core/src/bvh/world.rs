@@ -47,7 +47,7 @@ pub struct World {
     /// All entries when they are few.
     pub(super) few: Vec<u32>,
     pub(super) robustness: Robustness,
-    pub(super) level: Level,
+    pub(crate) level: Level,
 }
 
 impl World {

@@ -35,7 +35,7 @@ pub(crate) struct FrameContext<'a> {
     /// Radiance of the ambient lights alone.
     pub(crate) ambient: Vec3,
     pub(crate) camera_rays: CameraRays,
-    /// Instruction set of ray generation and shading; every one gives the same bits.
+    /// Instruction set of ray generation and shading: the world's. Every one gives the same bits.
     pub(crate) level: Level,
     /// Whether a material has maps.
     pub(crate) has_maps: bool,
@@ -110,7 +110,7 @@ impl<'a> FrameContext<'a> {
             irradiance: IrradianceCoefficients::new(scene.environment.as_ref(), ambient),
             ambient,
             camera_rays: CameraRays::new(camera, origin, bounds, lens),
-            level: Level::new(),
+            level: scene.world.level,
             transmissive: if passes_surfaces(effects) {
                 transmits_light(scene, effects)
             } else {
