@@ -2,7 +2,6 @@
 #![cfg(feature = "render")]
 
 mod scenes_common;
-use rt_core::bvh::{BuildOptions, World};
 use rt_core::camera::{Camera, CameraError};
 use rt_core::environment::Environment;
 use rt_core::frame::{Encoding, Layers, PlaneValues};
@@ -14,7 +13,6 @@ use rt_core::render::{
     AsyncRenderer, Crop, ProgressiveRenderer, RenderError, RenderOptions, StopReason, render,
 };
 use rt_core::scene::{AmbientOcclusion, Scene, SceneBuilder};
-use rt_core::simd::SimdLevel;
 use scenes_common::*;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -215,23 +213,6 @@ fn crop_is_part_of_the_whole_bit_for_bit() {
             assert_eq!(part.frame.depth[i], whole.frame.depth[k]);
             assert_eq!(part.frame.cost[i], whole.frame.cost[k]);
         }
-    }
-}
-
-#[test]
-fn every_instruction_set_shades_a_frame_with_the_same_bits() {
-    let mut s = busy_scene();
-    let world = s.world.clone();
-    let c = camera(DVec3::new(6.0, 1.0, 2.0), 0.6);
-    let best = draw(&s, &c, all_layers(48));
-    for level in SimdLevel::available() {
-        let options = BuildOptions { simd: Some(level), ..BuildOptions::default() };
-        let geometries = world.geometries().to_vec();
-        let rebuilt = World::build(geometries, world.instances().to_vec(), &options).unwrap();
-        s.world = Arc::new(rebuilt);
-        let o = draw(&s, &c, all_layers(48));
-        assert_eq!(o.frame.color, best.frame.color, "{}", level.name());
-        assert_eq!(o.frame.depth, best.frame.depth, "{}", level.name());
     }
 }
 

@@ -135,21 +135,25 @@ pub(crate) fn merge_row<P: Composite, S: Simd>(
             taken += done.count_ones() as usize;
             word ^= done;
         }
-        for_runs(word, |start, length| {
-            let (colors, depths) = taken_run::<P>(row, taken, length);
-            let at = first + start;
-            let held_depths =
-                if P::HAS_DEPTH { &mut held_depths[at..at + length] } else { &mut [] };
-            merge_run::<P, S>(
-                simd,
-                colors,
-                depths,
-                &mut held_colors[at..at + length],
-                held_depths,
-                side,
-            );
-            taken += length;
-        });
+        for_runs(
+            word,
+            #[inline(always)]
+            |start, length| {
+                let (colors, depths) = taken_run::<P>(row, taken, length);
+                let at = first + start;
+                let held_depths =
+                    if P::HAS_DEPTH { &mut held_depths[at..at + length] } else { &mut [] };
+                merge_run::<P, S>(
+                    simd,
+                    colors,
+                    depths,
+                    &mut held_colors[at..at + length],
+                    held_depths,
+                    side,
+                );
+                taken += length;
+            },
+        );
     }
 }
 

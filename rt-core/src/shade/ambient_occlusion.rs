@@ -175,26 +175,32 @@ pub(super) fn ambient_block<S: Simd>(
         || {
             let color = Vec3x16::load(simd, &at.color);
             let normal = Vec3x16::load(simd, &at.normal);
-            by_material(context, &at.instance, at.lit, |material, lanes| {
-                if supports(&material.model) {
-                    let light = response_block::ambient(
-                        simd,
-                        context.effects,
-                        &material.model,
-                        mean,
-                        color,
-                        normal,
-                    );
-                    let old = Vec3x16::load(simd, out);
-                    light.or_else(mask32x16::from_bitmask(simd, lanes as u64), old).store(out);
-                    return;
-                }
-                for lane in (0..LANES).filter(|l| lanes >> l & 1 != 0) {
-                    let albedo =
-                        ambient_albedo(&material.model, at.color.get(lane), context.effects);
-                    out.set(lane, albedo * mean.for_normal(at.normal.get(lane)));
-                }
-            });
+            by_material(
+                context,
+                &at.instance,
+                at.lit,
+                #[inline(always)]
+                |material, lanes| {
+                    if supports(&material.model) {
+                        let light = response_block::ambient(
+                            simd,
+                            context.effects,
+                            &material.model,
+                            mean,
+                            color,
+                            normal,
+                        );
+                        let old = Vec3x16::load(simd, out);
+                        light.or_else(mask32x16::from_bitmask(simd, lanes as u64), old).store(out);
+                        return;
+                    }
+                    for lane in (0..LANES).filter(|l| lanes >> l & 1 != 0) {
+                        let albedo =
+                            ambient_albedo(&material.model, at.color.get(lane), context.effects);
+                        out.set(lane, albedo * mean.for_normal(at.normal.get(lane)));
+                    }
+                },
+            );
         },
     );
 }

@@ -10,7 +10,7 @@ use super::point_block::{PointBlock, by_material};
 use super::response_block::{Lobe, incident, length, respond, supports};
 use crate::light::{ResolvedLight, ResolvedLightKind};
 use crate::ray::{LANES, RayBlock};
-use crate::simd::vectors::{Row, Rows3, Vec3x16};
+use crate::simd::vectors::{Rows3, Vec3x16};
 use fearless_simd::{Select, Simd, SimdBase, SimdMask, f32x16, mask32x16};
 use glam::Vec3;
 
@@ -86,29 +86,35 @@ impl LightBlock {
         let normal = Vec3x16::load(simd, &at.normal);
         let view = Vec3x16::load(simd, &at.view);
         let mut sum = Vec3x16::splat(simd, Vec3::ZERO);
-        by_material(context, &at.instance, at.lit, |material, lanes| {
-            let of_this = mask32x16::from_bitmask(simd, lanes as u64);
-            let answer = if supports(&material.model) {
-                respond(simd, Lobe::of(&material.model), color, normal, view, dir, light)
-            } else {
-                let (mut rows, mut dirs) = (Rows3::ZERO, Rows3::ZERO);
-                dir.store(&mut dirs);
-                for lane in (0..LANES).filter(|l| lanes >> l & 1 != 0) {
-                    let answer = response(
-                        &material.model,
-                        at.normal.get(lane),
-                        at.color.get(lane),
-                        at.view.get(lane),
-                        dirs.get(lane),
-                        light.color,
-                        light.highlight,
-                    );
-                    rows.set(lane, answer);
-                }
-                Vec3x16::load(simd, &rows)
-            };
-            sum = answer.scale(strength).or_else(of_this, sum);
-        });
+        by_material(
+            context,
+            &at.instance,
+            at.lit,
+            #[inline(always)]
+            |material, lanes| {
+                let of_this = mask32x16::from_bitmask(simd, lanes as u64);
+                let answer = if supports(&material.model) {
+                    respond(simd, Lobe::of(&material.model), color, normal, view, dir, light)
+                } else {
+                    let (mut rows, mut dirs) = (Rows3::ZERO, Rows3::ZERO);
+                    dir.store(&mut dirs);
+                    for lane in (0..LANES).filter(|l| lanes >> l & 1 != 0) {
+                        let answer = response(
+                            &material.model,
+                            at.normal.get(lane),
+                            at.color.get(lane),
+                            at.view.get(lane),
+                            dirs.get(lane),
+                            light.color,
+                            light.highlight,
+                        );
+                        rows.set(lane, answer);
+                    }
+                    Vec3x16::load(simd, &rows)
+                };
+                sum = answer.scale(strength).or_else(of_this, sum);
+            },
+        );
         sum.store(&mut self.radiance);
         let dark = strength.simd_le(zero)
             | sum.x.simd_eq(zero) & sum.y.simd_eq(zero) & sum.z.simd_eq(zero);
@@ -117,6 +123,24 @@ impl LightBlock {
             shadow_rays(simd, at, dir, light, from_light, errors, &mut self.rays);
         }
     }
+}
+
+#[inline(always)]
+fn store<S: Simd>(
+    out: &mut RayBlock,
+    origin: Vec3x16<S>,
+    dir: Vec3x16<S>,
+    t_min: f32x16<S>,
+    t_max: f32x16<S>,
+) {
+    origin.x.store_slice(&mut out.ox);
+    origin.y.store_slice(&mut out.oy);
+    origin.z.store_slice(&mut out.oz);
+    dir.x.store_slice(&mut out.dx);
+    dir.y.store_slice(&mut out.dy);
+    dir.z.store_slice(&mut out.dz);
+    t_min.store_slice(&mut out.t_min);
+    t_max.store_slice(&mut out.t_max);
 }
 
 /// As [`super::direct::shadow_ray`].
@@ -131,36 +155,20 @@ fn shadow_rays<S: Simd>(
     out: &mut RayBlock,
 ) {
     let v = |x: f32| f32x16::splat(simd, x);
-    let largest = |p: Vec3x16<S>| p.x.abs().max(p.y.abs()).max(p.z.abs());
     let error = f32x16::from_slice(simd, &at.point_error);
     let face_normal = Vec3x16::load(simd, &at.face_normal);
     let side = dir.dot(face_normal).simd_ge(v(0.0)).select(error, -error);
     let origin = Vec3x16::load(simd, &at.point).add(face_normal.scale(side));
-    let mut store = |origin: Vec3x16<S>, dir: Vec3x16<S>, t_min: f32x16<S>, t_max: f32x16<S>| {
-        let rows: [(f32x16<S>, &mut Row); 8] = [
-            (origin.x, &mut out.ox),
-            (origin.y, &mut out.oy),
-            (origin.z, &mut out.oz),
-            (dir.x, &mut out.dx),
-            (dir.y, &mut out.dy),
-            (dir.z, &mut out.dz),
-            (t_min, &mut out.t_min),
-            (t_max, &mut out.t_max),
-        ];
-        for (values, row) in rows {
-            values.store_slice(row);
-        }
-    };
     let place = match light.kind {
         ResolvedLightKind::Point { position }
         | ResolvedLightKind::Spot { position, .. }
         | ResolvedLightKind::Cone { position, .. } => position,
-        _ => return store(origin, dir, v(0.0), v(f32::INFINITY)),
+        _ => return store(out, origin, dir, v(0.0), v(f32::INFINITY)),
     };
     // The sum makes -0 a 0, as the lift of lights without a plane does.
     let place = Vec3x16::splat(simd, place + Vec3::ZERO);
     let to_light = place.sub(origin);
-    let reach = largest(place);
+    let reach = place.largest();
 
     // ---- From the surface.
     let distance = length(to_light);
@@ -168,14 +176,15 @@ fn shadow_rays<S: Simd>(
     let end = distance - at_light.min(v(0.5) * distance);
     let outward = to_light.div(distance);
     if !from_light {
-        return store(origin, outward, v(0.0), end);
+        return store(out, origin, outward, v(0.0), end);
     }
 
     // ---- From the light, where it is near enough.
-    let slack = v(8.0 * f32::EPSILON) * (reach + largest(origin));
-    let share = slack / largest(to_light);
+    let slack = v(8.0 * f32::EPSILON) * (reach + origin.largest());
+    let share = slack / to_light.largest();
     let near = slack.simd_le(v(most_errors) * error) & share.simd_lt(v(0.01));
     store(
+        out,
         place.or_else(near, origin),
         to_light.neg().or_else(near, outward),
         near.select(share, v(0.0)),

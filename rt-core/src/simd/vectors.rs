@@ -97,6 +97,12 @@ impl<S: Simd> Vec3x16<S> {
         Vec3x16 { x: -self.x, y: -self.y, z: -self.z }
     }
 
+    /// The magnitude of each vector's largest component.
+    #[inline(always)]
+    pub(crate) fn largest(self) -> f32x16<S> {
+        self.x.abs().max(self.y.abs()).max(self.z.abs())
+    }
+
     #[inline(always)]
     pub(crate) fn dot(self, o: Self) -> f32x16<S> {
         self.x * o.x + self.y * o.y + self.z * o.z

@@ -119,13 +119,12 @@ impl ResolvedInstance<'_> {
             out.face_normal.set(l, (n / length).as_vec3());
             positive[l] = if length > 0.0 { 1.0 } else { 0.0 };
         }
-        let largest = |p: Vec3x16<S>| p.x.abs().max(p.y.abs()).max(p.z.abs());
         let splat = |x: f32| f32x16::splat(simd, x);
-        let coordinates = largest(corners[0]).max(largest(corners[1])).max(largest(corners[2]));
+        let coordinates = corners[0].largest().max(corners[1].largest()).max(corners[2].largest());
         let mut error = splat(POINT_ERROR) * coordinates * splat(self.stretch);
         if self.moved {
             let point = Vec3x16::load(simd, &out.point);
-            error += splat(POINT_ERROR) * largest(point);
+            error += splat(POINT_ERROR) * point.largest();
         }
         error.store_slice(&mut out.point_error);
         f32x16::from_slice(simd, &positive).simd_gt(splat(0.0))

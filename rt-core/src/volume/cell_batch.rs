@@ -151,9 +151,13 @@ impl Volume {
     ) {
         let cubics = cubics(simd, ray, batch);
         let pieces = self.transfer.pieces(m.allows_simplified());
-        let lit = ray.lights.as_ref().map(|lights| {
-            LitCells::new(simd, self, lights, &batch.stored[..batch.len], &cubics.p, &cubics.q)
-        });
+        let lit = ray.lights.as_ref().map(
+            #[inline(always)]
+            |lights| {
+                let stored = &batch.stored[..batch.len];
+                LitCells::new(simd, self, lights, stored, &cubics.p, &cubics.q)
+            },
+        );
         // ---- Cut into segments along which the transfer function is linear.
         let segments = &mut batch.segments;
         for lane in 0..batch.len {
@@ -171,12 +175,18 @@ impl Volume {
                 }
                 segments.push(&b, t, [0.0, 1.0], &pieces.all()[first], lit.as_ref());
             } else if last - first <= MAX_KNOTS {
-                for_each_linear(&b, pieces, [first, last], |b, u, piece| {
-                    if segments.is_full() {
-                        segments.integrate(simd, ray, m);
-                    }
-                    segments.push(b, t, u, &pieces.all()[piece], lit.as_ref());
-                });
+                for_each_linear(
+                    &b,
+                    pieces,
+                    [first, last],
+                    #[inline(always)]
+                    |b, u, piece| {
+                        if segments.is_full() {
+                            segments.integrate(simd, ray, m);
+                        }
+                        segments.push(b, t, u, &pieces.all()[piece], lit.as_ref());
+                    },
+                );
             } else {
                 segments.integrate(simd, ray, m);
                 let [p, q] = [&cubics.p, &cubics.q].map(|rows| rows.map(|row| row[lane]));

@@ -18,7 +18,9 @@ const MAX_NEWTON_STEPS: u32 = 40;
 /// Calls `visit` with each part of the cubic `b` that lies within one piece of the transfer
 /// function, its range of the parameter, and the number of the piece. `first` and `last` are those
 /// of the smallest and largest coefficient.
-#[inline(never)]
+///
+/// Inlined, so that `visit` is compiled for the instruction set of the caller.
+#[inline(always)]
 pub(super) fn for_each_linear(
     b: &[f64; 4],
     pieces: &Pieces,

@@ -210,7 +210,6 @@ impl LinearSegments {
         let s = |x: f64| f64x8::splat(simd, x);
         let load = |row: &Row| f64x8::from_slice(simd, row);
         let zero = s(0.0);
-        let divided = |a: f64x8<S>, b: f64x8<S>| b.simd_gt(zero).select(a / b, zero);
         // ---- Extinction.
         let start = load(&self.start);
         let mut x = [zero; 4];
@@ -224,12 +223,12 @@ impl LinearSegments {
         let tau = sigma * length;
         let through = crate::simd::exponential::attenuation(simd, tau);
         let opacity = s(1.0) - through;
-        let g = divided(opacity, tau) - through - opacity * s(0.5);
+        let g = divided(opacity, tau, zero) - through - opacity * s(0.5);
         let g_thin = tau * tau * (tau * s(0.5) - s(1.0)) * s(1.0 / 12.0);
         let g = tau.simd_lt(s(THIN)).select(g_thin, g);
         // ---- Colours: mean over the optical thickness, and at the ends.
         let rise = x[3] - x[0];
-        let rho = divided(e1 * rise, sigma).abs();
+        let rho = divided(e1 * rise, sigma, zero).abs();
         let mut colors = [[zero; 2]; 3];
         for (color, rows) in colors.iter_mut().zip(&self.color) {
             *color = [load(&rows[0]), load(&rows[1])];
@@ -257,7 +256,7 @@ impl LinearSegments {
                     + nodes[1].0 * s(WEIGHTS[1]) * nodes[1].1[k]
                     + nodes[2].0 * s(WEIGHTS[2]) * nodes[2].1[k];
                 let delta = far[k] - near[k];
-                emitted[k] = max(divided(sum, weight) * opacity + delta * g, zero);
+                emitted[k] = max(divided(sum, weight, zero) * opacity + delta * g, zero);
                 change = max(change, delta.abs());
                 bend = max(bend, (nodes[1].1[k] - (near[k] + far[k]) * s(0.5)).abs());
             }
@@ -272,7 +271,7 @@ impl LinearSegments {
                 + (d[0] * d[2] + d[1] * d[3]) * s(2.0 / 35.0)
                 + d[0] * d[3] * s(1.0 / 70.0)
                 + d[1] * d[2] * s(9.0 / 70.0);
-            let at = mean + divided(e1 * variance, sigma);
+            let at = mean + divided(e1 * variance, sigma, zero);
             let bow = (x[1] + x[2] - x[0] - x[3]).abs() * s(3.0 / 8.0);
             let bow = max(bow, (x[1] - x[2] + rise * s(1.0 / 3.0)).abs());
             for (k, [c0, c1]) in colors.into_iter().enumerate() {
@@ -303,4 +302,10 @@ impl LinearSegments {
         error.store_slice(&mut e.error);
         e
     }
+}
+
+/// `a / b` where `b` is positive, `zero` elsewhere.
+#[inline(always)]
+fn divided<S: Simd>(a: f64x8<S>, b: f64x8<S>, zero: f64x8<S>) -> f64x8<S> {
+    b.simd_gt(zero).select(a / b, zero)
 }

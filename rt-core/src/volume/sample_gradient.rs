@@ -39,13 +39,14 @@ fn at_points<S: Simd>(
     cells: &Cells<S>,
 ) -> Vec3x16<S> {
     let s = |x: f32| f32x16::splat(simd, x);
-    let dims = medium.dims.to_array().map(|n| s((n - 1) as f32));
-    let at: [f32x16<S>; 3] = std::array::from_fn(|a| cells.low[a] + cells.inside[a]);
+    let dims = medium.dims.to_array();
+    let (low, inside) = (&cells.low, &cells.inside);
+    let at = [low[0] + inside[0], low[1] + inside[1], low[2] + inside[2]];
     let mut differences = [s(0.0); 3];
     for axis in 0..3 {
         let (mut before, mut after) = (at, at);
         before[axis] = (at[axis] - s(1.0)).max(s(0.0));
-        after[axis] = (at[axis] + s(1.0)).min(dims[axis]);
+        after[axis] = (at[axis] + s(1.0)).min(s((dims[axis] - 1) as f32));
         let difference = medium.point(simd, after) - medium.point(simd, before);
         // One-sided: over one spacing instead of two.
         let is_short = (after[axis] - before[axis]).simd_lt(s(1.5));

@@ -296,11 +296,10 @@ impl LightsOnRay {
         for n in &mut normal {
             *n = steep.select(*n / steepness, zero);
         }
-        let dot = |l: DVec3| normal[0] * s(l.x) + normal[1] * s(l.y) + normal[2] * s(l.z);
         let weight = steepness / (steepness + s(self.half_gradient));
         let mut sums = [zero; 3];
         for (light, color) in &self.lights {
-            let cos = dot(*light).abs();
+            let cos = dot(simd, &normal, *light).abs();
             for (sum, c) in sums.iter_mut().zip(color) {
                 *sum += cos * s(*c);
             }
@@ -313,15 +312,22 @@ impl LightsOnRay {
         }
         let Some(h) = &self.highlight else { return (factors, zero) };
         let base = match h.form {
-            VolumeHighlight::Halfway => dot(h.halfway).abs(),
+            VolumeHighlight::Halfway => dot(simd, &normal, h.halfway).abs(),
             VolumeHighlight::Mirrored => {
-                let base = dot(h.light) * dot(h.viewer) * s(2.0) - s(h.light.dot(h.viewer));
+                let (light, viewer) = (dot(simd, &normal, h.light), dot(simd, &normal, h.viewer));
+                let base = light * viewer * s(2.0) - s(h.light.dot(h.viewer));
                 max(base, zero)
             }
         };
         let peak = weight * s(h.specular) * powers(simd, base, h.shininess);
         (factors, steep.select(peak, zero))
     }
+}
+
+/// The dot products of eight vectors `v` with `w`.
+#[inline(always)]
+fn dot<S: Simd>(simd: S, v: &[f64x8<S>; 3], w: DVec3) -> f64x8<S> {
+    v[0] * f64x8::splat(simd, w.x) + v[1] * f64x8::splat(simd, w.y) + v[2] * f64x8::splat(simd, w.z)
 }
 
 /// `base` to the power of `exponent`.

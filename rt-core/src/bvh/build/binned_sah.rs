@@ -161,11 +161,7 @@ impl Bins {
     ) -> Option<SplitPlane> {
         let cut = self.best_cut(simd, bins, axes, leaves)?;
         let (left, right) = self.boxes[cut.axis][..bins].split_at(cut.bin as usize + 1);
-        let boxes = [left, right].map(|side| {
-            let mut b = Box4::EMPTY;
-            side.iter().for_each(|bin| b.union(simd, bin));
-            b
-        });
+        let boxes = [Box4::around(simd, left), Box4::around(simd, right)];
         Some(SplitPlane { map, cut, boxes })
     }
 }
@@ -344,7 +340,10 @@ fn find_plane_of_many<S: Simd>(
         space
     };
     let all = refs.par_chunks(PARALLEL_CHUNK).map(fill).reduce_with(|mut a, b| {
-        a.even.add_bins(simd, &b.even, bins, axes.clone());
+        simd.vectorize(
+            #[inline(always)]
+            || a.even.add_bins(simd, &b.even, bins, axes.clone()),
+        );
         a
     })?;
     if progress.is_stopped() {

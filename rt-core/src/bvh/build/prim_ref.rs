@@ -145,6 +145,16 @@ impl Box4 {
             .store_slice(&mut self.0);
     }
 
+    /// The box around all of `boxes`.
+    #[inline(always)]
+    pub(crate) fn around<S: Simd>(simd: S, boxes: &[Box4]) -> Box4 {
+        let mut all = Box4::EMPTY;
+        for one in boxes {
+            all.union(simd, one);
+        }
+        all
+    }
+
     /// Half the surface area. Only called on boxes that are not empty.
     #[inline(always)]
     pub(crate) fn half_area(&self) -> f32 {

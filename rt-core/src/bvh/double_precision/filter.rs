@@ -8,6 +8,7 @@ use super::build::LeafFloats;
 use crate::bvh::intersect::watertight::Shear;
 use crate::bvh::traverse::single::RaySetup;
 use crate::bvh::traverse::three;
+use crate::bvh::traverse::triangle_leaf::both_rows;
 use fearless_simd::{Select, Simd, SimdBase, SimdMask, f32x8};
 
 /// Largest error of a sheared coordinate.
@@ -49,17 +50,10 @@ pub(super) fn filter<S: Simd>(
     let Shear { kx, ky, kz, sx, sy, sz } = ray.shear;
     let axes = [kx, ky, kz];
     let splat = |x: f32| f32x8::splat(simd, x);
-    let both = |vertex: usize, axis: usize| {
-        let at = 4 * (3 * vertex + axis);
-        simd.combine_f32x4(
-            fearless_simd::f32x4::from_slice(simd, &leaves[0][at..at + 4]),
-            fearless_simd::f32x4::from_slice(simd, &leaves[1][at..at + 4]),
-        )
-    };
     let o: [f32x8<S>; 3] = three!(|k| splat(ray.origin[axes[k]]));
-    let a: [f32x8<S>; 3] = three!(|k| both(0, axes[k]) - o[k]);
-    let b: [f32x8<S>; 3] = three!(|k| both(1, axes[k]) - o[k]);
-    let c: [f32x8<S>; 3] = three!(|k| both(2, axes[k]) - o[k]);
+    let a: [f32x8<S>; 3] = three!(|k| both_rows(simd, leaves, axes[k]) - o[k]);
+    let b: [f32x8<S>; 3] = three!(|k| both_rows(simd, leaves, 3 + axes[k]) - o[k]);
+    let c: [f32x8<S>; 3] = three!(|k| both_rows(simd, leaves, 6 + axes[k]) - o[k]);
     let (sx, sy, sz) = (splat(sx), splat(sy), splat(sz));
     let (ax, ay) = (a[0] - sx * a[2], a[1] - sy * a[2]);
     let (bx, by) = (b[0] - sx * b[2], b[1] - sy * b[2]);

@@ -82,6 +82,7 @@ impl<S: Simd> LeafTest<S> for WithCorners<'_> {
     type Query = ClosestHit;
     const TOGETHER: bool = <ClosestLeaf<'_, WatertightTest> as LeafTest<S>>::TOGETHER;
 
+    #[inline(always)]
     fn test(&mut self, simd: S, units: &[Unit], leaf: ChildRef, skip_t: &mut f32) -> bool {
         let before = self.inner.best;
         let over = self.inner.test(simd, units, leaf, skip_t);
@@ -89,6 +90,7 @@ impl<S: Simd> LeafTest<S> for WithCorners<'_> {
         over
     }
 
+    #[inline(always)]
     fn test_many(
         &mut self,
         simd: S,
@@ -107,6 +109,7 @@ impl<S: Simd> LeafTest<S> for WithCorners<'_> {
 
 impl WithCorners<'_> {
     /// Keeps the corners of the best triangle, where a test of `leaves` has changed it.
+    #[inline(never)]
     fn keep(&mut self, before: ClosestTri, units: &[Unit], leaves: impl Iterator<Item = ChildRef>) {
         let best = self.inner.best;
         if !best.found || (before.found && before.prim == best.prim) {

@@ -1,5 +1,6 @@
 //! Traces blocks of rays in any direction through a triangle hierarchy.
 
+use super::three;
 use super::tree_view::TreeView;
 use super::{hybrid, meshlets, scattered};
 use crate::bvh::Unit;
@@ -77,7 +78,7 @@ pub(crate) fn trace<S: Simd, T: TriangleTest, Q: HitQuery>(
 fn close_reach<S: Simd>(simd: S, tree: &TreeView<'_>) -> [f32; 3] {
     let root: &[Unit; NODE_UNITS] =
         tree.units[..NODE_UNITS].try_into().expect("a slice of that length");
-    std::array::from_fn(|axis| {
+    three!(|axis| {
         let lo = f32x8::from_slice(simd, &root[2 * axis].0).reduce_min();
         let hi = f32x8::from_slice(simd, &root[2 * axis + 1].0).reduce_max();
         CLOSE * (hi - lo)

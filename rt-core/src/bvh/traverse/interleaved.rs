@@ -9,7 +9,10 @@
 //! a node's children are tested together, two to a vector, an any-hit query pushes its children
 //! without a branch, and a leaf alone is tested twice rather than by code of its own.
 
-use super::single::{BOX_SLACK, LeafTest, RaySetup, inflate_t, leaf_slots, push_children};
+use super::single::{
+    BOX_SLACK, LeafTest, RaySetup, distances, inflate_t, leaf_slots, push_children,
+};
+use super::three;
 use super::tree_view::TreeView;
 use crate::bvh::Unit;
 use crate::bvh::layout::wide::{CHILD_ROW, ChildRef, NODE_UNITS, STACK_SIZE};
@@ -114,15 +117,14 @@ impl<'r, L: Copy> Lane<'r, L> {
         let (units, at, ray) = (tree.units, self.current.unit(), self.ray);
         let node: &[Unit; NODE_UNITS] =
             units[at..at + NODE_UNITS].try_into().expect("a slice of that length");
-        let plane = |row: usize, axis: usize| {
-            (f32x8::from_slice(simd, &node[row & 7].0) - f32x8::splat(simd, ray.origin[axis]))
-                * f32x8::splat(simd, ray.rcp[axis])
-        };
-        let [nx, ny, nz] = ray.near;
-        let near =
-            plane(nx, 0).max(plane(ny, 1)).max(plane(nz, 2).max(f32x8::splat(simd, ray.t_min)));
-        let far = plane(nx ^ 1, 0).min(plane(ny ^ 1, 1)).min(plane(nz ^ 1, 2))
-            * f32x8::splat(simd, BOX_SLACK);
+        let origin: [f32x8<S>; 3] = three!(|a| f32x8::splat(simd, ray.origin[a]));
+        let rcp: [f32x8<S>; 3] = three!(|a| f32x8::splat(simd, ray.rcp[a]));
+        let [x, y, z]: [f32x8<S>; 3] =
+            three!(|a| distances(simd, node, ray.near[a], origin[a], rcp[a]));
+        let near = x.max(y).max(z.max(f32x8::splat(simd, ray.t_min)));
+        let [x, y, z]: [f32x8<S>; 3] =
+            three!(|a| distances(simd, node, ray.near[a] ^ 1, origin[a], rcp[a]));
+        let far = x.min(y).min(z) * f32x8::splat(simd, BOX_SLACK);
         let hit = near.simd_le(far.min(f32x8::splat(simd, self.skip_t)));
         let hit = tree.visible(at, hit.to_bitmask() as u32);
         let refs = node[CHILD_ROW].bits();

@@ -170,7 +170,6 @@ pub(crate) fn traverse_from<S: Simd, L: LeafTest<S>>(
     // distances below zero never matter, because t_min is not negative.
     let slack = f32x8::splat(simd, BOX_SLACK);
     let rcp_far: [f32x8<S>; 3] = three!(|a| rcp[a] * slack);
-    let [nx, ny, nz] = ray.near;
     // The distance is in the high half, so integer order is the order of distances. t_min >= 0
     // keeps the distance non-negative.
     let mut memory = StackMemory::<u64, STACK_SIZE>::new();
@@ -187,16 +186,12 @@ pub(crate) fn traverse_from<S: Simd, L: LeafTest<S>>(
             let at = current.unit();
             let node: &[Unit; NODE_UNITS] =
                 units[at..at + NODE_UNITS].try_into().expect("a slice of that length");
-            let plane = |row: usize, axis: usize, rcp: f32x8<S>| {
-                (f32x8::from_slice(simd, &node[row & 7].0) - origin[axis]) * rcp
-            };
-            let near =
-                plane(nx, 0, rcp[0]).max(plane(ny, 1, rcp[1])).max(plane(nz, 2, rcp[2]).max(t_min));
-            let far = plane(nx ^ 1, 0, rcp_far[0]).min(plane(ny ^ 1, 1, rcp_far[1])).min(plane(
-                nz ^ 1,
-                2,
-                rcp_far[2],
-            ));
+            let [x, y, z]: [f32x8<S>; 3] =
+                three!(|a| distances(simd, node, ray.near[a], origin[a], rcp[a]));
+            let near = x.max(y).max(z.max(t_min));
+            let [x, y, z]: [f32x8<S>; 3] =
+                three!(|a| distances(simd, node, ray.near[a] ^ 1, origin[a], rcp_far[a]));
+            let far = x.min(y).min(z);
             let hit = near.simd_le(far.min(f32x8::splat(simd, skip_t)));
             let hit = tree.visible(at, hit.to_bitmask() as u32);
             let refs = node[CHILD_ROW].bits();
@@ -223,6 +218,19 @@ pub(crate) fn traverse_from<S: Simd, L: LeafTest<S>>(
             }
         }
     }
+}
+
+/// Distances of a ray to the planes in row `row` of a node, given its origin and the reciprocal of
+/// its direction along the planes' axis.
+#[inline(always)]
+pub(super) fn distances<S: Simd>(
+    simd: S,
+    node: &[Unit; NODE_UNITS],
+    row: usize,
+    origin: f32x8<S>,
+    rcp: f32x8<S>,
+) -> f32x8<S> {
+    (f32x8::from_slice(simd, &node[row & 7].0) - origin) * rcp
 }
 
 /// Selects the next child of a node, given the boxes in `mask` that the ray hits at the distances

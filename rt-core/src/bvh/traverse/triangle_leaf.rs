@@ -48,16 +48,19 @@ pub(crate) fn test_two_leaves<S: Simd, T: TriangleTest>(
 ) -> Option<Candidate<f32x8<S>, mask32x8<S>>> {
     let Shear { kx, ky, kz, sx, sy, sz } = ray.shear;
     let axes = [kx, ky, kz];
-    let both = |r: usize| {
-        let [first, second] = [0, 1].map(|i| row(leaves[i], r));
-        simd.combine_f32x4(f32x4::from_slice(simd, first), f32x4::from_slice(simd, second))
-    };
     let o: [f32x8<S>; 3] = three!(|k| f32x8::splat(simd, ray.origin[axes[k]]));
-    let a: [f32x8<S>; 3] = three!(|k| both(axes[k]) - o[k]);
-    let b: [f32x8<S>; 3] = three!(|k| both(3 + axes[k]) - o[k]);
-    let c: [f32x8<S>; 3] = three!(|k| both(6 + axes[k]) - o[k]);
+    let a: [f32x8<S>; 3] = three!(|k| both_rows(simd, leaves, axes[k]) - o[k]);
+    let b: [f32x8<S>; 3] = three!(|k| both_rows(simd, leaves, 3 + axes[k]) - o[k]);
+    let c: [f32x8<S>; 3] = three!(|k| both_rows(simd, leaves, 6 + axes[k]) - o[k]);
     let (sx, sy, sz) = (f32x8::splat(simd, sx), f32x8::splat(simd, sy), f32x8::splat(simd, sz));
     test::<S, f32x8<S>, T>(simd, a, b, c, sx, sy, sz)
+}
+
+/// Row `r` of two leaves, the first leaf's in the low lanes.
+#[inline(always)]
+pub(crate) fn both_rows<S: Simd>(simd: S, leaves: [&LeafFloats; 2], r: usize) -> f32x8<S> {
+    let [first, second] = [row(leaves[0], r), row(leaves[1], r)];
+    simd.combine_f32x4(f32x4::from_slice(simd, first), f32x4::from_slice(simd, second))
 }
 
 #[derive(Clone, Copy)]

@@ -6,7 +6,7 @@ use crate::bvh::compact::{Expanded, MeshletCache, with_cache};
 use crate::bvh::layout::wide::{CHILD_ROW, ChildRef, NODE_UNITS, Unit, WIDTH};
 use crate::bvh::query::{HitQuery, TriangleTest};
 use crate::bvh::traverse::single::{
-    BOX_SLACK, LeafTest, RaySetup, leaf_slots, traverse, traverse_body,
+    BOX_SLACK, LeafTest, RaySetup, distances, leaf_slots, traverse, traverse_body,
 };
 use crate::bvh::traverse::three;
 use crate::bvh::traverse::tree_view::TreeView;
@@ -50,7 +50,6 @@ fn visit<S: Simd, L: LeafTest<S>>(
     let rcp: [f32x8<S>; 3] = three!(|a| f32x8::splat(simd, ray.rcp[a]));
     let t_min = f32x8::splat(simd, ray.t_min);
     let slack = f32x8::splat(simd, BOX_SLACK);
-    let [nx, ny, nz] = ray.near;
     // The distance in the high half, as in the ordinary tree. No more than the nodes.
     let mut stack = [0u64; 16];
     let (mut len, mut at) = (0, 0);
@@ -58,11 +57,12 @@ fn visit<S: Simd, L: LeafTest<S>>(
         count(Counter::Nodes, 1);
         let node: &[Unit; NODE_UNITS] =
             nodes[at..at + NODE_UNITS].try_into().expect("a slice of that length");
-        let plane = |row: usize, axis: usize| {
-            (f32x8::from_slice(simd, &node[row & 7].0) - origin[axis]) * rcp[axis]
-        };
-        let near = plane(nx, 0).max(plane(ny, 1)).max(plane(nz, 2).max(t_min));
-        let far = plane(nx ^ 1, 0).min(plane(ny ^ 1, 1)).min(plane(nz ^ 1, 2)) * slack;
+        let [x, y, z]: [f32x8<S>; 3] =
+            three!(|a| distances(simd, node, ray.near[a], origin[a], rcp[a]));
+        let near = x.max(y).max(z.max(t_min));
+        let [x, y, z]: [f32x8<S>; 3] =
+            three!(|a| distances(simd, node, ray.near[a] ^ 1, origin[a], rcp[a]));
+        let far = x.min(y).min(z) * slack;
         let hit = near.simd_le(far.min(f32x8::splat(simd, *skip_t))).to_bitmask() as u32;
         let refs = node[CHILD_ROW].bits();
         let now = hit & leaf_slots(simd, refs);
