@@ -1,5 +1,6 @@
 //! Traversal by one ray at a time: eight boxes per step, nearest child first.
 
+use super::child_order::push_by_distance;
 use super::three;
 use super::tree_view::TreeView;
 use crate::bvh::Unit;
@@ -252,6 +253,10 @@ pub(super) fn push_children<S: Simd, Q: HitQuery, const PREFETCH: bool>(
         let hit = mask32x8::from_bitmask(simd, u64::from(mask));
         let children = u32x8::from_slice(simd, refs).compress(hit).to_array();
         stack.push_first(children.map(u64::from), mask.count_ones() as usize);
+        return None;
+    }
+    if !PREFETCH && <S::f32s as SimdBase<S>>::LEN >= WIDTH {
+        push_by_distance(simd, refs, near, mask, stack);
         return None;
     }
     if mask == 0 {
