@@ -33,7 +33,8 @@ impl<'a> GatherSlice<'a> {
             let [a, b] = unsafe { pairs_avx512(self.values.as_ptr(), &index) };
             return [f32x16::simd_from(simd, a), f32x16::simd_from(simd, b)];
         }
-        self.pairs_one_by_one(&index).map(|row| f32x16::simd_from(simd, row))
+        let [a, b] = self.pairs_two_by_two(&index);
+        [f32x16::simd_from(simd, a), f32x16::simd_from(simd, b)]
     }
 
     /// `values[i]` for each index, which is clamped to the first of the last pair.
@@ -53,13 +54,25 @@ impl<'a> GatherSlice<'a> {
     // Not inlined: a gradient reads sixteen pairs of sixteen lanes, and with all of their loads in
     // one function rt-core took three times as long to compile.
     #[inline(never)]
-    fn pairs_one_by_one(self, index: &[u32; 16]) -> [[f32; 16]; 2] {
-        let mut out = [[0.0; 16]; 2];
-        for (lane, i) in index.iter().enumerate() {
-            let i = i.min(&self.last);
+    fn pairs_two_by_two(self, index: &[u32; 16]) -> [[f32; 16]; 2] {
+        let pair = |lane: usize| {
+            let i = index[lane].min(self.last) as usize;
             // SAFETY: the index is at most `last`, which is two less than the length.
-            let at = |i: usize| unsafe { *self.values.get_unchecked(i) };
-            (out[0][lane], out[1][lane]) = (at(*i as usize), at(*i as usize + 1));
+            unsafe { self.values.get_unchecked(i..i + 2) }
+        };
+        let mut out = [[0.0; 16]; 2];
+        #[cfg(target_arch = "x86_64")]
+        for (k, lane) in (0..16).step_by(4).enumerate() {
+            let pairs = [0, 1, 2, 3].map(|i| pair(lane + i).as_ptr().cast());
+            // SAFETY: every pointer is to two numbers; the loads need no alignment.
+            let (a, b) = unsafe { four_pairs(pairs) };
+            out[0].as_chunks_mut::<4>().0[k] = a;
+            out[1].as_chunks_mut::<4>().0[k] = b;
+        }
+        #[cfg(not(target_arch = "x86_64"))]
+        for lane in 0..16 {
+            let pair = pair(lane);
+            (out[0][lane], out[1][lane]) = (pair[0], pair[1]);
         }
         out
     }
@@ -68,6 +81,25 @@ impl<'a> GatherSlice<'a> {
     fn numbers_one_by_one(self, index: &[u32; 16]) -> [f32; 16] {
         // SAFETY: the index is at most `last`, which is less than the length.
         index.map(|i| unsafe { *self.values.get_unchecked(i.min(self.last) as usize) })
+    }
+}
+
+/// The first and the second numbers of four pairs: one load of eight bytes for each pair.
+///
+/// # Safety
+/// Each pointer is to two numbers of four bytes.
+#[cfg(target_arch = "x86_64")]
+#[inline(always)]
+unsafe fn four_pairs(pairs: [*const f64; 4]) -> ([f32; 4], [f32; 4]) {
+    use std::arch::x86_64::*;
+    // SAFETY: the caller's promise for the loads; SSE2, which every such processor has.
+    unsafe {
+        let low = _mm_castpd_ps(_mm_loadh_pd(_mm_load_sd(pairs[0]), pairs[1]));
+        let high = _mm_castpd_ps(_mm_loadh_pd(_mm_load_sd(pairs[2]), pairs[3]));
+        let (mut a, mut b) = ([0.0; 4], [0.0; 4]);
+        _mm_storeu_ps(a.as_mut_ptr(), _mm_shuffle_ps::<0b10_00_10_00>(low, high));
+        _mm_storeu_ps(b.as_mut_ptr(), _mm_shuffle_ps::<0b11_01_11_01>(low, high));
+        (a, b)
     }
 }
 
