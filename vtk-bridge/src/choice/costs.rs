@@ -72,11 +72,21 @@ const RAYS_SAMPLE: SampleCosts = SampleCosts {
     light: [0.0; 2],
     light_of_seen: [27.0, 51.0],
 };
-/// How many times as long rays take with other instructions. With SSE2 the loops alone were
-/// measured, at 0.85 to 1.2 times the speed of OpenGL's where AVX-512 has 1.2 to 2.5. AVX2 was not
-/// measured; in between, and rather too slow.
-const SLOWER: [(SimdLevel, f64); 2] = [(SimdLevel::Avx512, 1.0), (SimdLevel::Avx2, 1.4)];
-const SLOWEST: f64 = 2.0;
+/// How many times as long rays take with other instructions: for samples, and for their light.
+#[derive(Debug, Clone, Copy)]
+struct Slower {
+    samples: f64,
+    light: f64,
+}
+
+const AS_FAST: Slower = Slower { samples: 1.0, light: 1.0 };
+/// Of rt-core's frames of 512 by 512 pixels with 65 points an axis, samples a spacing apart
+/// (bench/runs/2026-11-27-2core-avx-512-amd-epyc/instruction-sets-before-and-after.csv). llvmpipe's
+/// vectors are no wider with AVX-512, so its time is the same.
+const AVX2: Slower = Slower { samples: 1.4, light: 2.5 };
+/// Against OpenGL's, which is slower too: with SSE2 the loops alone were measured, at 0.85 to 1.2
+/// times the speed of OpenGL's where AVX-512 has 1.2 to 2.5.
+const SSE: Slower = Slower { samples: 2.0, light: 2.0 };
 /// Milliseconds of a frame of rays with a volume for a million pixels: it has layers to blend.
 const LAYERS: f64 = 216.0;
 /// Milliseconds of OpenGL's frame of volumes alone for a million pixels, beside their samples.
@@ -86,13 +96,13 @@ const BUILD_POINT: f64 = 20.0;
 
 impl SampleCosts {
     /// Milliseconds of all samples.
-    fn of(&self, work: &VolumeWork) -> f64 {
+    fn of(&self, work: &VolumeWork, slower: Slower) -> f64 {
         let [small, large] = POINTS.map(f64::ln);
         let part = (((work.points.max(1) as f64).ln() - small) / (large - small)).clamp(0.0, 1.0);
         let at = |[small, large]: [f64; 2]| small + (large - small) * part;
         let lit = |pair| if work.shaded { at(pair) } else { 0.0 };
-        let any = at(self.any) + lit(self.light);
-        let seen = at(self.seen) + lit(self.light_of_seen);
+        let any = slower.samples * at(self.any) + slower.light * lit(self.light);
+        let seen = slower.samples * at(self.seen) + slower.light * lit(self.light_of_seen);
         1e-6 * (any * work.samples + seen * work.seen)
     }
 }
@@ -100,11 +110,14 @@ impl SampleCosts {
 impl PartCosts {
     /// A volume's part of a frame, with rays at this level.
     pub fn of_volume(work: &VolumeWork, level: Option<SimdLevel>) -> PartCosts {
-        let known = SLOWER.iter().find(|(known, _)| Some(*known) == level);
-        let slower = known.map_or(SLOWEST, |(_, factor)| *factor);
+        let slower = match level {
+            Some(SimdLevel::Avx512) => AS_FAST,
+            Some(SimdLevel::Avx2) => AVX2,
+            _ => SSE,
+        };
         PartCosts {
-            opengl: OPENGL_SAMPLE.of(work),
-            rays: slower * RAYS_SAMPLE.of(work),
+            opengl: OPENGL_SAMPLE.of(work, AS_FAST),
+            rays: RAYS_SAMPLE.of(work, slower),
             build: 1e-6 * BUILD_POINT * work.points as f64,
         }
     }
