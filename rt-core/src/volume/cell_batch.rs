@@ -151,13 +151,12 @@ impl Volume {
     ) {
         let cubics = cubics(simd, ray, batch);
         let pieces = self.transfer.pieces(m.allows_simplified());
-        let lit = ray.lights.as_ref().map(
-            #[inline(always)]
-            |lights| {
-                let stored = &batch.stored[..batch.len];
-                LitCells::new(simd, self, lights, stored, &cubics.p, &cubics.q)
-            },
-        );
+        // Not by `map`, which may be compiled on its own, without the instruction set.
+        let mut lit = None;
+        if let Some(lights) = &ray.lights {
+            let stored = &batch.stored[..batch.len];
+            lit = Some(LitCells::new(simd, self, lights, stored, &cubics.p, &cubics.q));
+        }
         // ---- Cut into segments along which the transfer function is linear.
         let segments = &mut batch.segments;
         for lane in 0..batch.len {

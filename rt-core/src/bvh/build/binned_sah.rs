@@ -349,7 +349,10 @@ fn find_plane_of_many<S: Simd>(
     if progress.is_stopped() {
         return None;
     }
-    all.even.best_plane(simd, map, bins, axes, sah.leaves)
+    simd.vectorize(
+        #[inline(always)]
+        || all.even.best_plane(simd, map, bins, axes, sah.leaves),
+    )
 }
 
 /// Cuts `from` (at least two) at the best place: the two sides are the parts of `to`, which is as
