@@ -168,7 +168,7 @@ fn shadow_rays<S: Simd>(
     // The sum makes -0 a 0, as the lift of lights without a plane does.
     let place = Vec3x16::splat(simd, place + Vec3::ZERO);
     let to_light = place.sub(origin);
-    let reach = place.largest();
+    let reach = place.max_norm();
 
     // ---- From the surface.
     let distance = length(to_light);
@@ -180,8 +180,8 @@ fn shadow_rays<S: Simd>(
     }
 
     // ---- From the light, where it is near enough.
-    let slack = v(8.0 * f32::EPSILON) * (reach + origin.largest());
-    let share = slack / to_light.largest();
+    let slack = v(8.0 * f32::EPSILON) * (reach + origin.max_norm());
+    let share = slack / to_light.max_norm();
     let near = slack.simd_le(v(most_errors) * error) & share.simd_lt(v(0.01));
     store(
         out,

@@ -33,7 +33,7 @@ impl<'a> GatherSlice<'a> {
             let [a, b] = unsafe { pairs_avx512(self.values.as_ptr(), &index) };
             return [f32x16::simd_from(simd, a), f32x16::simd_from(simd, b)];
         }
-        let [a, b] = self.pairs_two_by_two(&index);
+        let [a, b] = self.pairs_four_at_a_time(&index);
         [f32x16::simd_from(simd, a), f32x16::simd_from(simd, b)]
     }
 
@@ -54,7 +54,7 @@ impl<'a> GatherSlice<'a> {
     // Not inlined: a gradient reads sixteen pairs of sixteen lanes, and with all of their loads in
     // one function rt-core took three times as long to compile.
     #[inline(never)]
-    fn pairs_two_by_two(self, index: &[u32; 16]) -> [[f32; 16]; 2] {
+    fn pairs_four_at_a_time(self, index: &[u32; 16]) -> [[f32; 16]; 2] {
         let pair = |lane: usize| {
             let i = index[lane].min(self.last) as usize;
             // SAFETY: the index is at most `last`, which is two less than the length.

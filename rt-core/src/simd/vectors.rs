@@ -97,9 +97,9 @@ impl<S: Simd> Vec3x16<S> {
         Vec3x16 { x: -self.x, y: -self.y, z: -self.z }
     }
 
-    /// The magnitude of each vector's largest component.
+    /// Each vector's maximum norm: the magnitude of its largest component.
     #[inline(always)]
-    pub(crate) fn largest(self) -> f32x16<S> {
+    pub(crate) fn max_norm(self) -> f32x16<S> {
         self.x.abs().max(self.y.abs()).max(self.z.abs())
     }
 

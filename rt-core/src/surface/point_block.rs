@@ -120,11 +120,12 @@ impl ResolvedInstance<'_> {
             positive[l] = if length > 0.0 { 1.0 } else { 0.0 };
         }
         let splat = |x: f32| f32x16::splat(simd, x);
-        let coordinates = corners[0].largest().max(corners[1].largest()).max(corners[2].largest());
+        let coordinates =
+            corners[0].max_norm().max(corners[1].max_norm()).max(corners[2].max_norm());
         let mut error = splat(POINT_ERROR) * coordinates * splat(self.stretch);
         if self.moved {
             let point = Vec3x16::load(simd, &out.point);
-            error += splat(POINT_ERROR) * point.largest();
+            error += splat(POINT_ERROR) * point.max_norm();
         }
         error.store_slice(&mut out.point_error);
         f32x16::from_slice(simd, &positive).simd_gt(splat(0.0))

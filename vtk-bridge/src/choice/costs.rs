@@ -80,9 +80,11 @@ struct Slower {
 }
 
 const AS_FAST: Slower = Slower { samples: 1.0, light: 1.0 };
-/// Of rt-core's frames of 512 by 512 pixels with 65 points an axis, samples a spacing apart
-/// (bench/runs/2026-11-27-2core-avx-512-amd-epyc/instruction-sets-before-and-after.csv). llvmpipe's
-/// vectors are no wider with AVX-512, so its time is the same.
+/// Of rt-core's frames of 512 by 512 pixels with 65 points an axis, samples a spacing apart: 1.31
+/// and 1.36, and 2.5 for what light adds
+/// (bench/runs/2026-11-27-2core-avx-512-amd-epyc/instruction-sets-before-and-after.csv). Grids
+/// beyond the caches were not measured. llvmpipe's vectors are no wider with AVX-512, so its time
+/// is the same.
 const AVX2: Slower = Slower { samples: 1.4, light: 2.5 };
 /// Against OpenGL's, which is slower too: with SSE2 the loops alone were measured, at 0.85 to 1.2
 /// times the speed of OpenGL's where AVX-512 has 1.2 to 2.5.

@@ -6,8 +6,9 @@
 //! rays with random ends run 1.6 to 2.1 times as fast as two at a time.)
 //!
 //! Branches are the second cost, because whether a box is hit is unpredictable. So the leaves among
-//! a node's children are tested together, two to a vector, an any-hit query pushes its children
-//! without a branch, and a leaf alone is tested twice rather than by code of its own.
+//! a node's children are tested together, two to a vector, children are pushed without a branch
+//! ([`super::child_order`] for closest hits), and a leaf alone is tested twice rather than by code
+//! of its own.
 
 use super::single::{
     BOX_SLACK, LeafTest, RaySetup, distances, inflate_t, leaf_slots, push_children,

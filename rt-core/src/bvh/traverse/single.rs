@@ -255,6 +255,7 @@ pub(super) fn push_children<S: Simd, Q: HitQuery, const PREFETCH: bool>(
         stack.push_first(children.map(u64::from), mask.count_ones() as usize);
         return None;
     }
+    // Narrower vectors need more steps than the branches cost.
     if !PREFETCH && <S::f32s as SimdBase<S>>::LEN >= WIDTH {
         push_by_distance(simd, refs, near, mask, stack);
         return None;
