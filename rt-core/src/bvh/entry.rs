@@ -52,6 +52,23 @@ impl<'w> Entry<'w> {
         }
     }
 
+    /// Nodes on the longest path from the root of the tree to a leaf.
+    pub(super) fn depth(self) -> usize {
+        match self {
+            Entry::Instance { blas, .. } => blas.depth(),
+            Entry::Group(group) => group.bvh.depth,
+        }
+    }
+
+    /// The instance of primitive `prim` of the tree, and its number there.
+    #[inline]
+    pub(super) fn owner(self, prim: u32) -> (u32, u32) {
+        match self {
+            Entry::Instance { number, .. } => (number, prim),
+            Entry::Group(group) => group.owner(prim),
+        }
+    }
+
     /// Replaces the tree's own numbers in hits by those of instances and their primitives.
     #[inline]
     pub(super) fn resolve(self, hits: &mut [HitBlock]) {

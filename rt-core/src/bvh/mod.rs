@@ -8,6 +8,7 @@ mod build;
 mod closest_point;
 pub(crate) mod compact;
 mod double_precision;
+mod entries_in_turns;
 mod entry;
 mod entry_blocks;
 mod entry_packets;
@@ -31,6 +32,7 @@ mod streams;
 mod top_level;
 pub(crate) mod traverse;
 mod triangle_bvh;
+mod turned_bounds;
 mod validate;
 mod world;
 

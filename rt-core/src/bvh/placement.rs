@@ -2,6 +2,7 @@
 
 use super::layout::local_frame::LocalFrame;
 use super::layout::wide::{ChildRef, Unit};
+use super::turned_bounds::around_turned;
 use crate::bvh::traverse::packet::PacketLimits;
 use crate::math::{Aabb, max_abs};
 use crate::ray::{LANES, Ray, RayBlock};
@@ -84,12 +85,7 @@ impl Placement {
                 let object = p.as_dvec3() / frame.scale + frame.center;
                 world_from_object.transform_point3(object) - world_origin
             };
-            // Rays and their directions are rounded to f32 in local space, from up to 64 radii away
-            // in each axis: the error is at most 2⁻¹⁵ radii.
-            let rows = world_from_object.matrix3.transpose();
-            let stretch =
-                DVec3::new(rows.x_axis.length(), rows.y_axis.length(), rows.z_axis.length());
-            let margin = stretch / frame.scale * radius * (-15f64).exp2();
+            let margin = margin(world_from_object, frame, radius);
             let mut b = Aabb::EMPTY;
             for c in local_bounds.corners() {
                 let p = render_from_local(c);
@@ -110,6 +106,27 @@ impl Placement {
             local_from_render,
             bounds: [bounds.min, bounds.max],
         })
+    }
+
+    /// Bounds in render space that are close to the boxes of `outline`, in local space, and not only
+    /// to the box around them; all that is held here lies in one of these. The other arguments are
+    /// those of [`Placement::new`].
+    pub(super) fn tighten(
+        &mut self,
+        outline: &[Aabb],
+        world_from_object: &DAffine3,
+        frame: &LocalFrame,
+        world_origin: DVec3,
+    ) {
+        let render_from_local = DAffine3 {
+            matrix3: world_from_object.matrix3 * (1.0 / frame.scale),
+            translation: world_from_object.transform_point3(frame.center) - world_origin,
+        };
+        let (lo, hi) = around_turned(outline, &render_from_local);
+        let margin = margin(world_from_object, frame, self.radius);
+        let [min, max] = &mut self.bounds;
+        *min = min.max(round_down(lo - margin));
+        *max = max.min(round_up(hi + margin));
     }
 
     /// Writes the placement of entry `number` into a leaf of the upper level.
@@ -288,6 +305,14 @@ impl Placement {
         }
         inside
     }
+}
+
+/// How far rays may pass by what they hit, in render space: they and their directions are rounded to
+/// f32 in local space, from up to 64 radii away in each axis. The error is at most 2⁻¹⁵ radii.
+fn margin(world_from_object: &DAffine3, frame: &LocalFrame, radius: f64) -> DVec3 {
+    let rows = world_from_object.matrix3.transpose();
+    let stretch = DVec3::new(rows.x_axis.length(), rows.y_axis.length(), rows.z_axis.length());
+    stretch / frame.scale * radius * (-15f64).exp2()
 }
 
 /// A limit on a moved ray: the x below it are those with `(x as f64 + moved) as f32 < t`, so that

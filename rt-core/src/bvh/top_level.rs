@@ -9,6 +9,7 @@ use super::layout::wide::{LeafWriter, Unit, WideBvh};
 use super::mesh_group::{GroupChoice, MeshGroup};
 use super::options::BuildQuality;
 use super::placement::{PLACEMENT_UNITS, Placement};
+use super::turned_bounds::Outlines;
 use crate::math::Aabb;
 use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
@@ -19,6 +20,8 @@ pub(super) struct TopLevel {
     pub(super) placements: Vec<Placement>,
     /// Instances by number, and the group by the number after the last instance.
     pub(super) tlas: WideBvh,
+    /// The boxes around the geometries' boxes: a part knows those of the whole without its trees.
+    pub(super) bounds: Aabb,
     /// The entry when there is only one.
     pub(super) only: Option<u32>,
     /// All entries when there are at most [`MOST_IN_TURN`].
@@ -65,20 +68,26 @@ pub(super) fn build_top_level(
     notes: &mut Vec<String>,
     progress: &Progress<'_>,
 ) -> Result<TopLevel, BuildError> {
+    let outlines = Outlines::new(blas.len());
     let place_one = |(i, inst): (usize, &Instance)| {
         let b = &blas[inst.geometry];
-        let bounds = [b.reach(), b.bounds()];
-        Placement::new(inst.geometry, &inst.world_from_object, &b.frame, bounds, origin).ok_or(
-            BuildError::SingularTransform {
+        let (bounds, to_world) = ([b.reach(), b.bounds()], &inst.world_from_object);
+        let mut placement = Placement::new(inst.geometry, to_world, &b.frame, bounds, origin)
+            .ok_or(BuildError::SingularTransform {
                 instance: i,
-                determinant: inst.world_from_object.matrix3.determinant(),
-            },
-        )
+                determinant: to_world.matrix3.determinant(),
+            })?;
+        let around = placement.bounds();
+        if let Some(outline) = outlines.of_turned(inst, b) {
+            placement.tighten(outline, to_world, &b.frame, origin);
+        }
+        Ok((placement, around))
     };
     // Of several errors, the first in order is returned, whichever thread finds its error first.
     let placed: Vec<_> =
         instances.par_iter().enumerate().with_min_len(1024).map(place_one).collect();
-    let placements = placed.into_iter().collect::<Result<Vec<_>, _>>()?;
+    let placed = placed.into_iter().collect::<Result<Vec<_>, BuildError>>()?;
+    let (placements, around): (Vec<_>, Vec<_>) = placed.into_iter().unzip();
     let alone = |p: &Placement| blas[p.geometry()].bvh().is_some();
     let entries = placements.iter().enumerate().filter(|(_, p)| alone(p));
     let entries = entries.chain(group.map(|g| (placements.len(), &g.placement)));
@@ -89,6 +98,9 @@ pub(super) fn build_top_level(
         })
         .map(|(id, p)| PrimRef::new(p.bounds(), id as u32))
         .collect();
+    let of_group = group.map_or(Aabb::EMPTY, |g| g.placement.bounds());
+    let around = |r: &PrimRef| around.get(r.id() as usize).copied().unwrap_or(of_group);
+    let bounds = refs.iter().map(around).fold(Aabb::EMPTY, Aabb::union);
     let only = match (instances, refs.as_slice()) {
         ([_], _) => Some(0),
         (_, [only]) => Some(only.id()),
@@ -103,7 +115,7 @@ pub(super) fn build_top_level(
     config.sah.leaves = LeafCapacity::One;
     let writer = EntryWriter { placements: &placements, group };
     let tlas = build_wide(refs, &writer, config, notes, progress)?;
-    Ok(TopLevel { placements, tlas, only, few })
+    Ok(TopLevel { placements, tlas, bounds, only, few })
 }
 
 /// The origin of render space: zero, or the centre of the world's bounds when they are more than

@@ -65,11 +65,11 @@ impl World {
         let notes = &mut self.report.notes;
         let group = self.group.as_deref();
         let placed = build_top_level(&self.instances, &self.blas, group, origin, notes, &UNWATCHED);
-        let TopLevel { placements, tlas, only, few } =
+        let TopLevel { placements, tlas, bounds, only, few } =
             placed.expect("the build accepted these transforms");
         self.report.primitives = self.blas.iter().map(|b| b.primitives).sum();
         self.report.skipped = self.blas.iter().map(|b| b.skipped).sum();
-        (self.origin, self.bounds) = (origin, tlas.bounds);
+        (self.origin, self.bounds) = (origin, bounds);
         (self.placements, self.tlas) = (placements, tlas);
         (self.only, self.few) = (only, few);
     }

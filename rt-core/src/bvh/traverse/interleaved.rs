@@ -17,6 +17,7 @@ use super::three;
 use super::tree_view::TreeView;
 use crate::bvh::Unit;
 use crate::bvh::layout::wide::{CHILD_ROW, ChildRef, NODE_UNITS, STACK_SIZE};
+use crate::bvh::query::HitQuery;
 use crate::simd::{Stack, StackMemory, prefetch};
 use crate::stats::{Counter, count};
 use fearless_simd::{Simd, SimdBase, SimdMask, f32x8};
@@ -100,7 +101,7 @@ impl<'r, L: Copy> Lane<'r, L> {
             if self.leaf.test(simd, units, self.current, &mut self.skip_t) {
                 return true;
             }
-            self.current = pop_nearer(stack, self.skip_t);
+            self.current = pop_nearer(stack, 0, self.skip_t);
         } else {
             self.visit_node(simd, tree, stack);
         }
@@ -114,43 +115,71 @@ impl<'r, L: Copy> Lane<'r, L> {
     where
         L: LeafTest<S>,
     {
-        count(Counter::Nodes, 1);
-        let (units, at, ray) = (tree.units, self.current.unit(), self.ray);
-        let node: &[Unit; NODE_UNITS] =
-            units[at..at + NODE_UNITS].try_into().expect("a slice of that length");
-        let origin: [f32x8<S>; 3] = three!(|a| f32x8::splat(simd, ray.origin[a]));
-        let rcp: [f32x8<S>; 3] = three!(|a| f32x8::splat(simd, ray.rcp[a]));
-        let [x, y, z]: [f32x8<S>; 3] =
-            three!(|a| distances(simd, node, ray.near[a], origin[a], rcp[a]));
-        let near = x.max(y).max(z.max(f32x8::splat(simd, ray.t_min)));
-        let [x, y, z]: [f32x8<S>; 3] =
-            three!(|a| distances(simd, node, ray.near[a] ^ 1, origin[a], rcp[a]));
-        let far = x.min(y).min(z) * f32x8::splat(simd, BOX_SLACK);
-        let hit = near.simd_le(far.min(f32x8::splat(simd, self.skip_t)));
-        let hit = tree.visible(at, hit.to_bitmask() as u32);
-        let refs = node[CHILD_ROW].bits();
-        let leaves = hit & leaf_slots(simd, refs);
-        // The first two leaves are requested without a branch on their number. Where there is none,
-        // this node is, which is in the cache: what is requested in vain takes the place of what is
-        // not.
-        for set in [leaves, leaves & leaves.wrapping_sub(1)] {
-            let leaf = ChildRef(refs[set.trailing_zeros() as usize & 7]);
-            prefetch::<3, _>(units, if set == 0 { at } else { leaf.unit() });
-        }
+        let at = self.current.unit();
+        let Opened { leaves, next } =
+            open_node::<S, L::Query>(simd, tree, at, self.ray, self.skip_t, true, stack);
         (self.leaves, self.parent) = (leaves, at);
-        let next =
-            push_children::<S, L::Query, false>(simd, units, node, near, hit & !leaves, stack);
-        self.current = next.unwrap_or_else(
-            #[inline(always)]
-            || pop_nearer(stack, self.skip_t),
-        );
+        self.current = match next {
+            Some(next) => next,
+            None => pop_nearer(stack, 0, self.skip_t),
+        };
     }
 }
 
-/// The next subtree nearer than `skip_t`, or [`ChildRef::NONE`].
+/// What a node has for a ray.
+pub(crate) struct Opened {
+    /// Leaves to test now: a set of slots.
+    pub(crate) leaves: u32,
+    /// The child to visit next; `None` when it is on the stack.
+    pub(crate) next: Option<ChildRef>,
+}
+
+/// Tests the boxes of the node at unit `at` and pushes the children that the ray enters. With
+/// `together`, leaves are not pushed: they are to be tested now, and the first two are requested
+/// from memory.
 #[inline(always)]
-fn pop_nearer(stack: &mut RayStack<'_>, skip_t: f32) -> ChildRef {
-    while let Some(entry) = stack.pop() {
+pub(crate) fn open_node<S: Simd, Q: HitQuery>(
+    simd: S,
+    tree: &TreeView<'_>,
+    at: usize,
+    ray: &RaySetup,
+    skip_t: f32,
+    together: bool,
+    stack: &mut RayStack<'_>,
+) -> Opened {
+    count(Counter::Nodes, 1);
+    let units = tree.units;
+    let node: &[Unit; NODE_UNITS] =
+        units[at..at + NODE_UNITS].try_into().expect("a slice of that length");
+    let origin: [f32x8<S>; 3] = three!(|a| f32x8::splat(simd, ray.origin[a]));
+    let rcp: [f32x8<S>; 3] = three!(|a| f32x8::splat(simd, ray.rcp[a]));
+    let [x, y, z]: [f32x8<S>; 3] =
+        three!(|a| distances(simd, node, ray.near[a], origin[a], rcp[a]));
+    let near = x.max(y).max(z.max(f32x8::splat(simd, ray.t_min)));
+    let [x, y, z]: [f32x8<S>; 3] =
+        three!(|a| distances(simd, node, ray.near[a] ^ 1, origin[a], rcp[a]));
+    let far = x.min(y).min(z) * f32x8::splat(simd, BOX_SLACK);
+    let hit = near.simd_le(far.min(f32x8::splat(simd, skip_t)));
+    let hit = tree.visible(at, hit.to_bitmask() as u32);
+    let refs = node[CHILD_ROW].bits();
+    let leaves = if together { hit & leaf_slots(simd, refs) } else { 0 };
+    // The first two leaves are requested without a branch on their number. Where there is none,
+    // this node is, which is in the cache: what is requested in vain takes the place of what is
+    // not.
+    for set in [leaves, leaves & leaves.wrapping_sub(1)] {
+        let leaf = ChildRef(refs[set.trailing_zeros() as usize & 7]);
+        prefetch::<3, _>(units, if set == 0 { at } else { leaf.unit() });
+    }
+    let next = push_children::<S, Q, false>(simd, units, node, near, hit & !leaves, stack);
+    Opened { leaves, next }
+}
+
+/// The next subtree nearer than `skip_t` above the first `base` entries of the stack, or
+/// [`ChildRef::NONE`].
+#[inline(always)]
+pub(crate) fn pop_nearer(stack: &mut RayStack<'_>, base: usize, skip_t: f32) -> ChildRef {
+    while stack.len() > base {
+        let Some(entry) = stack.pop() else { break };
         if f32::from_bits((entry >> 32) as u32) <= skip_t {
             return ChildRef(entry as u32);
         }

@@ -307,7 +307,7 @@ impl<'a> BuildRequest<'a> {
             b.notes.iter().map(|n| format!("geometry {i}: {n}")).collect::<Vec<_>>()
         };
         notes.extend(blas.iter().enumerate().flat_map(of_geometry));
-        let TopLevel { placements, tlas, only, few } =
+        let TopLevel { placements, tlas, bounds, only, few } =
             build_top_level(&instances, &blas, group.as_deref(), origin, &mut notes, progress)?;
         progress.finish()?;
         phases.push(("instances", start.elapsed() - phases[0].1));
@@ -327,7 +327,7 @@ impl<'a> BuildRequest<'a> {
             geometries,
             instances,
             origin,
-            bounds: whole.map_or(tlas.bounds, |w| w.bounds),
+            bounds: whole.map_or(bounds, |w| w.bounds),
             report,
             blas,
             placements,
