@@ -251,7 +251,8 @@ fn a_stored_mesh_is_drawn_and_refuses_what_it_cannot_honour() {
     let said: Value = serde_json::from_slice(&made.stdout).unwrap();
     assert_eq!(said["triangles"], ball().num_triangles());
     let warned = String::from_utf8_lossy(&made.stderr).into_owned();
-    assert!(warned.contains("colours and scalars are not stored"), "{warned}");
+    assert!(warned.contains("materials are not stored"), "{warned}");
+    assert!(said["attribute_bytes"].as_u64().unwrap() > 0, "{said}");
 
     let drawn = bench(&["render", &stored, "-o", &png, "--size", "64x64", "--json"]);
     assert!(drawn.status.success(), "{}", String::from_utf8_lossy(&drawn.stderr));
@@ -270,5 +271,40 @@ fn a_stored_mesh_is_drawn_and_refuses_what_it_cannot_honour() {
     refused(&[&stored, "--storage", "compact"], "--storage");
     refused(&[&stored, "--robustness", "fast"], "--robustness");
     refused(&[&stored, "--color-by", "z"], "--color-by");
+    refused(&[&stored, "--range", "0,1"], "--range");
     refused(&[&ply, "--memory", "5"], "--memory");
+}
+
+#[test]
+fn a_stored_mesh_has_the_picture_of_the_mesh_in_memory() {
+    let dir = tempfile::tempdir().unwrap();
+    let of = |name: &str| dir.path().join(name).display().to_string();
+    files(dir.path());
+    let (vtp, stored) = (of("ball.vtp"), of("ball.rtmesh"));
+    let camera = of("camera.toml");
+    std::fs::write(&camera, "eye = [2.0, 1.5, 1.0]\ntarget = [0.0, 0.0, 0.0]\n").unwrap();
+    let pixels = |file: &str| {
+        let png = of("picture.png");
+        let size = ["--size", "96x96", "--samples", "1", "--camera", camera.as_str()];
+        let drawn = bench(&[&["render", file, "-o", &png], &size[..]].concat());
+        assert!(drawn.status.success(), "{}", String::from_utf8_lossy(&drawn.stderr));
+        read_png(Path::new(&png)).unwrap().rgba().unwrap()
+    };
+    let expected = pixels(&vtp);
+    for (options, most) in [(&[][..], 1.5), (&["--normal-tolerance", "0.05"][..], 2.5)] {
+        let made = bench(&[&["store", &vtp, "-o", &stored], options].concat());
+        assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+        let found = pixels(&stored);
+        // Steps of 256.
+        let off = |(a, b): (&[f32; 4], &[f32; 4])| {
+            a.iter().zip(b).any(|(a, b)| 255.0 * (a - b).abs() > most)
+        };
+        let wrong = found.iter().zip(&expected).filter(|&pair| off(pair)).count();
+        assert_eq!(wrong, 0, "{options:?}: {wrong} pixels of {}", found.len());
+    }
+    // Without attributes, it is flat and has one colour.
+    let made = bench(&["store", &vtp, "-o", &stored, "--no-attributes", "--json"]);
+    let said: Value = serde_json::from_slice(&made.stdout).unwrap();
+    assert_eq!(said["attribute_bytes"], 0);
+    assert!(pixels(&stored) != expected);
 }

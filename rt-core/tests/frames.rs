@@ -566,6 +566,7 @@ impl rt_core::shapes::Shape for Explosive {
             point,
             point_error: 1e-6,
             normal: Vec3::Z,
+            shading_normal: None,
             scalar: None,
             color: None,
         }

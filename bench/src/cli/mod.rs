@@ -104,6 +104,21 @@ struct StoreArgs {
     /// Isovalue for image data [default: the middle of the range]
     #[arg(long, value_name = "VALUE", allow_hyphen_values = true, requires = "file")]
     isovalue: Option<f32>,
+    /// The array to colour the mesh by, as for `bench render`: its values are stored
+    #[arg(long, value_name = "ARRAY", requires = "file")]
+    color_by: Option<String>,
+    /// Angle by which normals may be off, in degrees; 0 stores them as given
+    #[arg(
+        long,
+        value_name = "DEGREES",
+        default_value_t = 0.0,
+        conflicts_with = "no_attributes",
+        value_parser = angle
+    )]
+    normal_tolerance: f64,
+    /// Stores triangles alone, without normals, colours and scalars
+    #[arg(long, conflicts_with = "color_by")]
+    no_attributes: bool,
     /// Megabytes that small pieces may take before they are written. More make faster files
     #[arg(
         long,
@@ -112,6 +127,15 @@ struct StoreArgs {
         value_parser = clap::value_parser!(u64).range(1..)
     )]
     memory: u64,
+}
+
+/// An angle in degrees, from 0 to 90.
+fn angle(text: &str) -> Result<f64, String> {
+    let degrees: f64 = text.parse().map_err(|e| format!("{e}"))?;
+    if !(0.0..=90.0).contains(&degrees) {
+        return Err("give degrees from 0 to 90".into());
+    }
+    Ok(degrees)
 }
 
 /// Options of `bench report`.

@@ -2,22 +2,23 @@
 
 use super::StoreArgs;
 use super::mesh_file::with_one_origin;
-use crate::image::subject::{LoadOptions, Subject};
+use crate::image::subject::{LoadOptions, PartColoring, Subject};
 use anyhow::Context as _;
 use datasets::cli::{Cancel, CommonArgs, CureExt as _, UsageError};
 use datasets::generate::nested_wavelet::{POINTS, isovalues_for};
 use datasets::generate::wavelet::Wavelet;
 use datasets::isosurface::{self, Options};
-use datasets::stored_mesh;
-use rt_core::bvh::{Geometry, StoredMeshReport};
+use datasets::stored_mesh::{self, StoredMeshFile};
+use rt_core::bvh::{Geometry, StoredMeshError, StoredMeshReport, StoredMeshWriter};
 use rt_core::glam::DVec3;
-use rt_core::mesh::MeshSlices;
+use rt_core::mesh::{MeshSlices, TriMesh};
 use serde_json::json;
 use std::time::Instant;
 
 pub(super) const EXAMPLES: &str = "\
 Examples:
   bench store surface.vtp -o surface.rtmesh
+  bench store surface.vtp -o surface.rtmesh --color-by pressure --normal-tolerance 0.1
   bench store --wavelet 256 -o wavelet.rtmesh --memory 4096
   bench render wavelet.rtmesh -o wavelet.png --memory 900";
 
@@ -44,6 +45,7 @@ pub(super) fn store(common: CommonArgs, args: &StoreArgs) -> anyhow::Result<()> 
         "skipped": report.skipped,
         "pages": report.pages,
         "bytes": report.bytes,
+        "attribute_bytes": report.attribute_bytes,
         "seconds": seconds,
     });
     common.result(&object, || {
@@ -67,7 +69,11 @@ fn store_file(
 ) -> anyhow::Result<StoredMeshReport> {
     let shown = file.display();
     let opened = datasets::read::open(file)?;
-    let options = LoadOptions { isovalue: args.isovalue, ..LoadOptions::default() };
+    let options = LoadOptions {
+        isovalue: args.isovalue,
+        color_by: args.color_by.clone(),
+        ..LoadOptions::default()
+    };
     let subject = Subject::from_file(&opened, &options)
         .with_context(|| format!("{shown}: no triangles to store"))?;
     drop(opened);
@@ -75,6 +81,13 @@ fn store_file(
         common.warn(format_args!("{shown}: {warning}"));
     }
     let all = subject.parts.len();
+    let with_materials = subject
+        .parts
+        .iter()
+        .any(|p| matches!(p.coloring, PartColoring::FileMaterial(_) | PartColoring::Glass(_)));
+    if with_materials && !args.no_attributes {
+        common.warn(format_args!("{shown}: materials are not stored, but colours of vertices are"));
+    }
     let meshes: Vec<_> = subject
         .parts
         .into_iter()
@@ -91,8 +104,8 @@ fn store_file(
         let left_out = all - meshes.len();
         common.warn(format_args!("{shown}: {left_out} parts that are not triangles are left out"));
     }
-    if meshes.iter().any(|mesh| mesh.scalars.is_some() || mesh.colors.is_some()) {
-        common.warn(format_args!("{shown}: colours and scalars are not stored"));
+    if meshes.iter().any(|mesh| mesh.texcoords.is_some()) && !args.no_attributes {
+        common.warn(format_args!("{shown}: texture coordinates are not stored"));
     }
     let origin = first.origin;
     let (meshes, moved) = with_one_origin(meshes);
@@ -101,10 +114,11 @@ fn store_file(
     }
     let mut writer = stored_mesh::create(&args.out, origin)?;
     writer.set_memory(memory);
+    writer.set_normal_tolerance(args.normal_tolerance);
     let bar = common.progress(meshes.len() as u64, "storing");
     for (number, mesh) in meshes.into_iter().enumerate() {
         cancel.check()?;
-        writer.add(&MeshSlices::of_mesh(&mesh))?;
+        add(&mut writer, args, &mesh)?;
         bar.set_position(number as u64 + 1);
     }
     Ok(stored_mesh::finish(writer)?)
@@ -123,13 +137,24 @@ fn store_wavelet(
     let isovalues = isovalues_for(&grid, millions as usize * 1_000_000)?;
     let mut writer = stored_mesh::create(&args.out, DVec3::ZERO)?;
     writer.set_memory(memory);
+    writer.set_normal_tolerance(args.normal_tolerance);
+    let options = Options { normals: !args.no_attributes, ..Options::default() };
     let bar = common.progress(isovalues.len() as u64, "storing");
     for (number, isovalue) in isovalues.iter().enumerate() {
         cancel.check()?;
-        let surface = isosurface::extract(&grid, &[*isovalue], Options::default())
+        let surface = isosurface::extract(&grid, &[*isovalue], options)
             .cure("give --wavelet fewer millions")?;
-        writer.add(&MeshSlices::of_mesh(&surface.mesh))?;
+        add(&mut writer, args, &surface.mesh)?;
         bar.set_position(number as u64 + 1);
     }
     Ok(stored_mesh::finish(writer)?)
+}
+
+/// Adds a mesh, with its attributes unless the user wants none.
+fn add(
+    writer: &mut StoredMeshWriter<StoredMeshFile>,
+    args: &StoreArgs,
+    mesh: &TriMesh,
+) -> Result<(), StoredMeshError> {
+    if args.no_attributes { writer.add(&MeshSlices::of_mesh(mesh)) } else { writer.add_mesh(mesh) }
 }

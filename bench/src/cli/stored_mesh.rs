@@ -31,10 +31,8 @@ pub(super) fn open(
         return Ok(None);
     }
     let without_effect = [
-        ("--color-by", options.color_by.is_some()),
         ("--isovalue", options.isovalue.is_some()),
         ("--volume", options.volume != VolumeChoice::No),
-        ("--range", args.range.is_some()),
         ("--storage", args.storage != Storage::Plain),
         ("--robustness", args.robustness != Robustness::Watertight),
     ];
@@ -45,9 +43,24 @@ pub(super) fn open(
         ))
         .into());
     }
+    if options.color_by.is_some() {
+        return Err(UsageError(format!(
+            "--color-by has no effect on {file}: the array is chosen when a mesh is stored; leave \
+             it out, or give it to `bench store`"
+        ))
+        .into());
+    }
     let memory = args.memory.unwrap_or(DEFAULT_MEMORY);
     let memory = usize::try_from(memory).unwrap_or(usize::MAX).saturating_mul(1 << 20);
-    Ok(Some(Arc::new(datasets::stored_mesh::open(&args.file, memory)?)))
+    let mesh = datasets::stored_mesh::open(&args.file, memory)?;
+    if args.range.is_some() && mesh.attributes().scalars.is_none() {
+        return Err(UsageError(format!(
+            "--range has no effect on {file}, which has no scalars; leave it out, or store the \
+             mesh with `bench store --color-by ARRAY`"
+        ))
+        .into());
+    }
+    Ok(Some(Arc::new(mesh)))
 }
 
 /// What was read of it, for the result in JSON.

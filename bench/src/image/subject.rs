@@ -218,7 +218,13 @@ impl Subject {
             let at = |corner: Vec3| mesh.origin() + corner.as_dvec3();
             corners_of_box(at(bounds.min), at(bounds.max)).into_iter().collect()
         };
-        let coloring = PartColoring::Color(DEFAULT_COLOR);
+        let scalars = mesh.attributes().scalars;
+        let coloring = if let Some(range) = scalars {
+            subject.extend_scalar_range(&range);
+            PartColoring::Scalars
+        } else {
+            PartColoring::Color(DEFAULT_COLOR)
+        };
         subject.parts.push(Part::shape(mesh.clone(), coloring, outline));
         subject
     }

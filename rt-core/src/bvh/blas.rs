@@ -246,7 +246,7 @@ impl Blas {
             Content::Shape { bvh, shape } => {
                 let (setup, t_max) = (RaySetup::new(ray), ray.t_max);
                 let best = ClosestTri { t: t_max, u: 0.0, v: 0.0, prim: 0, found: false };
-                let mut leaves = ShapeLeaf { shape: &**shape, ray: *ray, best };
+                let mut leaves = ShapeClosest { shape: &**shape, ray: *ray, best };
                 traverse(simd, &TreeView::all(bvh), &setup, t_max, &mut leaves);
                 leaves.best
             }
@@ -273,13 +273,14 @@ impl Blas {
     }
 }
 
-struct ShapeLeaf<'a> {
-    shape: &'a dyn Shape,
-    ray: Ray,
-    best: ClosestTri,
+/// The closest hit of a ray among primitives of a shape.
+pub(super) struct ShapeClosest<'a> {
+    pub(super) shape: &'a dyn Shape,
+    pub(super) ray: Ray,
+    pub(super) best: ClosestTri,
 }
 
-impl<S: Simd> LeafTest<S> for ShapeLeaf<'_> {
+impl<S: Simd> LeafTest<S> for ShapeClosest<'_> {
     type Query = ClosestHit;
 
     #[inline(always)]
@@ -299,10 +300,11 @@ impl<S: Simd> LeafTest<S> for ShapeLeaf<'_> {
     }
 }
 
-struct ShapeAny<'a> {
-    shape: &'a dyn Shape,
-    ray: Ray,
-    found: bool,
+/// Whether a primitive of a shape blocks a ray.
+pub(super) struct ShapeAny<'a> {
+    pub(super) shape: &'a dyn Shape,
+    pub(super) ray: Ray,
+    pub(super) found: bool,
 }
 
 impl<S: Simd> LeafTest<S> for ShapeAny<'_> {

@@ -3,9 +3,11 @@
 
 use super::blas::{Blas, Content};
 use super::instance_filter::InstanceFilter;
+use super::layout::wide::WideBvh;
 use super::mesh_group::MeshGroup;
 use super::placement::Placement;
 use super::query::TriangleTest;
+use super::stored_mesh::StoredMesh;
 use super::traverse::tree_view::TreeView;
 use super::triangle_bvh;
 use crate::ray::{Hit, HitBlock, Ray};
@@ -42,6 +44,14 @@ impl<'w> Entry<'w> {
             },
             Entry::Group(group) => Some(group.tree(filter)),
         }
+    }
+
+    /// The stored mesh that this is an instance of, and the tree of its pages.
+    #[inline]
+    pub(super) fn pages(self) -> Option<(&'w WideBvh, &'w StoredMesh)> {
+        let Entry::Instance { blas, .. } = self else { return None };
+        let Content::Shape { bvh, shape } = &blas.content else { return None };
+        Some((bvh, shape.stored_mesh()?))
     }
 
     /// The number that hits in this entry's tree are stored with until [`Entry::resolve`].

@@ -4,6 +4,7 @@ use super::entry::Entry;
 use super::instance_filter::InstanceFilter;
 use super::layout::wide::{ChildRef, Unit};
 use super::query::{HitQuery, TriangleTest};
+use super::stored_mesh;
 use super::streams::{limits_of, merge_hits};
 use super::traverse::single::{RaySetup, traverse_from};
 use super::traverse::tree_view::TreeView;
@@ -122,6 +123,13 @@ impl<T: TriangleTest, Q: HitQuery> EntryBlocks<'_, T, Q> {
                     entry.resolve(found);
                 }
             }
+            None if inside.count_ones() > MAX_SINGLE_RAYS
+                && let Some((pages, mesh)) = entry.pages() =>
+            {
+                let local = std::slice::from_ref(&local);
+                let found = std::slice::from_mut(&mut found);
+                stored_mesh::trace::<S, Q>(simd, pages, mesh, local, found, entry.number());
+            }
             _ => {
                 for lane in lanes_of(inside) {
                     let ray = local.get(lane);
@@ -147,7 +155,7 @@ impl<T: TriangleTest, Q: HitQuery> EntryBlocks<'_, T, Q> {
 
 /// The numbers of the lanes in a mask.
 #[inline(always)]
-fn lanes_of(mut mask: u16) -> impl Iterator<Item = usize> {
+pub(super) fn lanes_of(mut mask: u16) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
         (mask != 0).then(|| {
             let lane = mask.trailing_zeros() as usize & 15;

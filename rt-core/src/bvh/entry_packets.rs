@@ -8,7 +8,7 @@ use super::streams::{limits_of, merge_hits, trace_tree};
 use super::world::World;
 use crate::bvh::traverse::incoherent;
 use crate::bvh::traverse::packet::{GROUPS, Packet, PacketEntries, RaysLeft};
-use crate::ray::{HitBlock, LANES, NO_HIT, RayBlock};
+use crate::ray::{HitBlock, LANES, RayBlock};
 use fearless_simd::Simd;
 use std::marker::PhantomData;
 
@@ -56,19 +56,13 @@ impl<S: Simd, T: TriangleTest, Q: HitQuery> PacketEntries<S> for EntryPackets<'_
         leaf: ChildRef,
         reached: u16,
         lanes: &[u16; LANES],
-        left: RaysLeft<'_>,
+        mut left: RaysLeft<'_>,
     ) -> u16 {
         let world = self.world;
         let Some(entry) = world.entry_of_leaf(units, leaf, self.filter) else { return 0 };
         let changed = self.enter(simd, entry, reached, lanes);
         for g in groups_of(changed) {
-            let hits = &self.hits[g];
-            for lane in 0..LANES {
-                let found = hits.prim[lane] != NO_HIT;
-                let t = if Q::ANY { -1.0 } else { hits.t[lane] };
-                left.t[g][lane] = if found { t } else { left.t[g][lane] };
-                left.active[g] &= !(u16::from(Q::ANY & found) << lane);
-            }
+            left.lower::<Q>(g, &self.hits[g]);
         }
         changed
     }
@@ -119,7 +113,7 @@ impl<T: TriangleTest, Q: HitQuery> EntryPackets<'_, T, Q> {
 
 /// The numbers of the groups in a mask.
 #[inline(always)]
-fn groups_of(mut mask: u16) -> impl Iterator<Item = usize> {
+pub(super) fn groups_of(mut mask: u16) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
         (mask != 0).then(|| {
             let g = mask.trailing_zeros() as usize & 15;

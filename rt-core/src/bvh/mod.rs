@@ -49,7 +49,8 @@ pub use ray_query::{MaskError, RayQuery};
 pub use refit::{RefitError, RefitReport};
 pub use render_space::RenderSpace;
 pub use stored_mesh::{
-    PageSink, PageSource, PageUse, StoredMesh, StoredMeshError, StoredMeshReport, StoredMeshWriter,
+    PageSink, PageSource, PageUse, StoredAttributes, StoredMesh, StoredMeshError, StoredMeshReport,
+    StoredMeshWriter,
 };
 pub(crate) use streams::Coherence;
 pub use streams::StreamError;

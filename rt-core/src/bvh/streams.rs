@@ -7,6 +7,7 @@ use super::options::Robustness;
 use super::placement::ORDINARY_LENGTHS;
 use super::placement::Placement;
 use super::query::{AnyHit, ClosestHit, FastTest, HitQuery, TriangleTest, WatertightTest};
+use super::stored_mesh;
 use super::world::{World, with_ordinary_length};
 use crate::bvh::traverse::incoherent;
 use crate::bvh::traverse::packet::{GROUPS, Packet, PacketLimits};
@@ -470,6 +471,10 @@ pub(super) fn trace_tree<S: Simd, T: TriangleTest, Q: HitQuery>(
     packet: &mut Packet,
 ) {
     let Some(tree) = entry.triangles(filter) else {
+        if let Some((pages, mesh)) = entry.pages() {
+            stored_mesh::trace::<S, Q>(simd, pages, mesh, rays, hits, entry.number());
+            return;
+        }
         trace_tree_by_single_rays::<S, T, Q>(simd, entry, rays, hits, filter);
         return;
     };

@@ -204,6 +204,7 @@ impl Shape for Cylinders {
             point,
             point_error,
             normal: normal.as_vec3(),
+            shading_normal: None,
             scalar: self.scalars.as_ref().map(|s| mix(s[i], s[j])),
             color: self.colors.as_ref().map(|k| std::array::from_fn(|n| mix(k[i][n], k[j][n]))),
         }

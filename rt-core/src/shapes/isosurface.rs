@@ -372,6 +372,7 @@ impl Shape for Isosurface {
             point,
             point_error,
             normal: normal.as_vec3(),
+            shading_normal: None,
             scalar: Some(scalar),
             color: None,
         }

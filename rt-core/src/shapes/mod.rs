@@ -17,6 +17,7 @@ pub use part::ShapePart;
 pub use sphere::Spheres;
 pub use tube::Tubes;
 
+use crate::bvh::StoredMesh;
 use crate::math::Aabb;
 use crate::ray::Ray;
 use glam::{DVec3, Vec3};
@@ -44,6 +45,9 @@ pub struct ShapeSurface {
     pub point_error: f32,
     /// Unit normal, outward where the shape has an outside.
     pub normal: Vec3,
+    /// Normal for shading, of any length, where it is another one: across flat pieces of a curved
+    /// surface, for example. Materials can ask for the other ([`crate::material::Material::flat`]).
+    pub shading_normal: Option<Vec3>,
     /// Scalar for the material's colour map, if the shape has scalars.
     pub scalar: Option<f32>,
     /// Linear RGBA, if the shape has colours.
@@ -106,6 +110,12 @@ pub trait Shape: Send + Sync {
     /// the tree to itself; else up to four share one, and are tested without their boxes.
     fn is_costly(&self) -> bool {
         false
+    }
+
+    /// The stored mesh that this is, if it is one: its pages take many rays at once.
+    #[doc(hidden)]
+    fn stored_mesh(&self) -> Option<&StoredMesh> {
+        None
     }
 
     /// Why answers since the shape was made may be wrong, for a shape whose data can become

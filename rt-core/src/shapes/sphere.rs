@@ -144,6 +144,7 @@ impl Shape for Spheres {
             point,
             point_error,
             normal: normal.as_vec3(),
+            shading_normal: None,
             scalar: self.scalars.as_ref().map(|s| s[i]),
             color: self.colors.as_ref().map(|c| c[i]),
         }

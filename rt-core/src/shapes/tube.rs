@@ -301,6 +301,7 @@ impl Shape for Tubes {
             point,
             point_error,
             normal: n.normal.as_vec3(),
+            shading_normal: None,
             scalar: self.scalars.as_ref().map(|s| mix(s[i], s[i + 1])),
             color: self.colors.as_ref().map(|c| std::array::from_fn(|k| mix(c[i][k], c[i + 1][k]))),
         }

@@ -362,6 +362,9 @@ impl<'a> ResolvedInstance<'a> {
         let point = self.render_from_object.transform_point3(s.point.as_dvec3());
         let normal =
             self.normal_from_object.map_or(s.normal, |m| (m * s.normal).normalize_or_zero());
+        let smooth = s.shading_normal.filter(|_| !self.material.flat);
+        let shading = smooth.map(|n| self.normal_from_object.map_or(n, |m| m * n));
+        let shading = shading.and_then(Vec3::try_normalize).unwrap_or(normal);
         let from_attribute = match &self.material.color_source {
             ColorSource::Attribute => match self.colors {
                 Some(c) => c.values.get(hit.prim as usize).copied(),
@@ -382,7 +385,7 @@ impl<'a> ResolvedInstance<'a> {
             max_abs(s.point),
             s.point_error,
             normal,
-            normal,
+            shading,
             Vec3::new(r, g, b),
             alpha,
         )

@@ -46,7 +46,9 @@ impl ResolvedInstance<'_> {
                     &ShapeHit { t: hit.t, u: hit.u, v: hit.v },
                     &self.object_ray(ray),
                 );
-                (None, shape.origin() + s.point.as_dvec3(), s.normal, s.normal)
+                let smooth = s.shading_normal.filter(|_| !self.material.flat);
+                let normal = smooth.and_then(Vec3::try_normalize).unwrap_or(s.normal);
+                (None, shape.origin() + s.point.as_dvec3(), normal, s.normal)
             }
         };
         let world = |n: Vec3| self.normal_from_object.map_or(n, |m| (m * n).normalize_or_zero());

@@ -93,6 +93,7 @@ impl Shape for BackFaces {
             point,
             point_error: point.abs().max_element() * 4.0 * f32::EPSILON,
             normal: shading.map_or(face, |n| n.try_normalize().unwrap_or(face)),
+            shading_normal: None,
             scalar: None,
             color: None,
         }

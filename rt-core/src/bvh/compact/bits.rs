@@ -8,19 +8,19 @@ fn mask(count: u32) -> u64 {
 
 /// The `count` bits from bit `at` on, at most 32. Needs one word after the one where they start.
 #[inline(always)]
-pub(super) fn read(words: &[u32], at: usize, count: u32) -> u32 {
+pub(crate) fn read(words: &[u32], at: usize, count: u32) -> u32 {
     let pair: &[u32; 2] = words[at >> 5..].first_chunk().expect("a word after the last number");
     let pair = u64::from(pair[0]) | u64::from(pair[1]) << 32;
     (pair >> (at & 31) & mask(count)) as u32
 }
 
 /// Bits needed for numbers up to `largest`.
-pub(super) fn width(largest: u32) -> u32 {
+pub(crate) fn width(largest: u32) -> u32 {
     32 - largest.leading_zeros()
 }
 
 /// Appends numbers.
-pub(super) struct Writer<'w> {
+pub(crate) struct Writer<'w> {
     words: &'w mut Vec<u32>,
     /// Bits that are not yet in `words`.
     pending: u64,
@@ -28,12 +28,12 @@ pub(super) struct Writer<'w> {
 }
 
 impl<'w> Writer<'w> {
-    pub(super) fn new(words: &'w mut Vec<u32>) -> Self {
+    pub(crate) fn new(words: &'w mut Vec<u32>) -> Self {
         Writer { words, pending: 0, count: 0 }
     }
 
     /// Appends the lowest `count` bits of `value`, which has no others.
-    pub(super) fn push(&mut self, value: u32, count: u32) {
+    pub(crate) fn push(&mut self, value: u32, count: u32) {
         debug_assert!(u64::from(value) <= mask(count), "{value} in {count} bits");
         self.pending |= u64::from(value) << self.count;
         self.count += count;
@@ -45,7 +45,7 @@ impl<'w> Writer<'w> {
     }
 
     /// Fills the last word, and adds the one that [`read`] needs behind it.
-    pub(super) fn finish(self) {
+    pub(crate) fn finish(self) {
         self.words.extend([self.pending as u32, 0]);
     }
 }

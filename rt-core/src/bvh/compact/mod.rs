@@ -17,7 +17,7 @@
 //! A sheet without any lattice takes 14.1 bytes per triangle (the test `compact_memory`), an
 //! isosurface on a lattice 13.6 (the example `storage`).
 
-mod bits;
+pub(crate) mod bits;
 mod boxes;
 mod build;
 mod cache;

@@ -1,10 +1,12 @@
-//! The pages in memory: those that rays have used last, within a budget.
+//! The pages in memory: those that rays have used last, within a budget. Attributes of pages are
+//! pages of their own here: they come and go by themselves.
 //!
 //! Each page has a lock, so that a page is read once although several threads wait for it. What
 //! leaves is decided by a second chance: pages stand in a queue, and one that was used since it was
 //! looked at last goes to the end. Threads keep the last few pages that they used besides, so that
 //! most rays take no lock.
 
+use super::attributes::PageAttributes;
 use super::page::Page;
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -14,16 +16,31 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 /// Pages that each thread keeps.
 const RECENT: usize = 16;
 
-type RecentPages = [Option<(u64, u32, Arc<Page>)>; RECENT];
+type RecentPages = [Option<(u64, u32, Arc<Part>)>; RECENT];
 
 thread_local! {
     static RECENTLY_USED: RefCell<RecentPages> = const { RefCell::new([const { None }; RECENT]) };
 }
 
+/// What the cache holds.
+pub(super) enum Part {
+    Page(Page),
+    Attributes(PageAttributes),
+}
+
+impl Part {
+    fn bytes(&self) -> usize {
+        match self {
+            Part::Page(page) => page.bytes(),
+            Part::Attributes(attributes) => attributes.bytes(),
+        }
+    }
+}
+
 /// A place for a page.
 #[derive(Default)]
 struct Slot {
-    page: Mutex<Option<Arc<Page>>>,
+    page: Mutex<Option<Arc<Part>>>,
     /// Whether it was used since it was looked at last.
     used: AtomicBool,
 }
@@ -84,8 +101,8 @@ impl PageCache {
     pub(super) fn with<R>(
         &self,
         number: u32,
-        read: impl FnOnce() -> Option<Page>,
-        work: impl FnOnce(&Page) -> R,
+        read: impl FnOnce() -> Option<Part>,
+        work: impl FnOnce(&Part) -> R,
     ) -> Option<R> {
         let recent = RECENTLY_USED.with_borrow(|pages| match &pages[number as usize % RECENT] {
             Some((key, page, held)) if (*key, *page) == (self.key, number) => Some(held.clone()),
@@ -103,7 +120,7 @@ impl PageCache {
         Some(work(&page))
     }
 
-    fn page(&self, number: u32, read: impl FnOnce() -> Option<Page>) -> Option<Arc<Page>> {
+    fn page(&self, number: u32, read: impl FnOnce() -> Option<Part>) -> Option<Arc<Part>> {
         let slot = self.slots.get(number as usize)?;
         slot.used.store(true, Ordering::Relaxed);
         let mut held = lock(&slot.page);

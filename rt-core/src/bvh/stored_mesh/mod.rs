@@ -15,23 +15,27 @@
 //!
 //! Hits are those of the same triangles in memory, bit for bit, where the mesh's coordinates are
 //! stored as they are. Of two triangles hit at the same distance in different pages, the page with
-//! the lower number wins, not the triangle. Shading uses the geometric normal: files have no
-//! attributes.
+//! the lower number wins, not the triangle. Normals, colours and scalars lie behind each page
+//! ([`attributes`]), and are read when a hit on it is shaded.
 
+mod attributes;
+mod blocks;
 mod bytes;
 mod cache;
 mod error;
 mod format;
+mod octahedral;
 mod page;
 mod read;
 #[cfg(test)]
 mod tests;
 mod write;
 
+pub(crate) use blocks::trace;
 pub use bytes::{PageSink, PageSource};
 pub use cache::PageUse;
 pub use error::StoredMeshError;
-pub use read::StoredMesh;
+pub use read::{StoredAttributes, StoredMesh};
 pub use write::{StoredMeshReport, StoredMeshWriter};
 
 #[cfg(doc)]

@@ -23,9 +23,17 @@ pub(super) struct Page {
 
 /// A triangle that a ray hits.
 pub(super) struct PageHit {
-    /// Number in the mesh.
-    pub(super) triangle: u64,
+    first: u64,
+    /// Number in the page.
+    pub(super) id: u32,
     pub(super) corners: [Vec3; 3],
+}
+
+impl PageHit {
+    /// Number of the triangle in the mesh.
+    pub(super) fn triangle(&self) -> u64 {
+        self.first + u64::from(self.id)
+    }
 }
 
 impl Page {
@@ -38,13 +46,18 @@ impl Page {
         Ok(Page { tree, first: entry.first })
     }
 
+    /// The tree of its triangles.
+    pub(super) fn view(&self) -> TreeView<'_> {
+        TreeView::of_meshlets(&self.tree)
+    }
+
     /// Bytes in memory.
     pub(super) fn bytes(&self) -> usize {
         self.tree.bvh.units.len() * size_of::<Unit>() + size_of::<Page>()
     }
 
     pub(super) fn closest(&self, level: Level, ray: &Ray) -> Option<ClosestTri> {
-        let view = TreeView::of_meshlets(&self.tree);
+        let view = self.view();
         let hit = dispatch!(
             level,
             simd => triangle_bvh::closest::<_, WatertightTest>(simd, &view, ray)
@@ -53,7 +66,7 @@ impl Page {
     }
 
     pub(super) fn occluded(&self, level: Level, ray: &Ray) -> bool {
-        let view = TreeView::of_meshlets(&self.tree);
+        let view = self.view();
         dispatch!(
             level,
             simd => triangle_bvh::occluded::<_, WatertightTest>(simd, &view, ray)
@@ -62,13 +75,12 @@ impl Page {
 
     /// The triangle that [`Page::closest`] finds.
     pub(super) fn triangle(&self, level: Level, ray: &Ray) -> Option<PageHit> {
-        let (view, setup) = (TreeView::of_meshlets(&self.tree), RaySetup::new(ray));
+        let (view, setup) = (self.view(), RaySetup::new(ray));
         let inner = ClosestLeaf::<WatertightTest>::new(&setup, ray.t_max);
         let leaf = WithCorners { inner, corners: [Vec3::ZERO; 3] };
         let leaf = dispatch!(level, simd => meshlets::search(simd, &view, &setup, ray.t_max, leaf));
         let best = leaf.inner.best;
-        best.found
-            .then(|| PageHit { triangle: self.first + u64::from(best.prim), corners: leaf.corners })
+        best.found.then(|| PageHit { first: self.first, id: best.prim, corners: leaf.corners })
     }
 }
 

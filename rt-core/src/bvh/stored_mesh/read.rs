@@ -1,11 +1,12 @@
 //! Reads the pages of a stored mesh as rays need them.
 
 use super::StoredMeshReport;
+use super::attributes::{HitAttributes, PageAttributes};
 use super::bytes::PageSource;
-use super::cache::{PageCache, PageUse};
+use super::cache::{PageCache, PageUse, Part};
 use super::error::StoredMeshError;
 use super::format::{
-    ENTRY_BYTES, HEADER_BYTES, Header, MAGIC, NoHeader, PageEntry, UNIT_BYTES, VERSION, checksum,
+    Attributes, ENTRY_BYTES, HEADER_BYTES, Header, MAGIC, NoHeader, PageEntry, VERSION, checksum,
 };
 use super::page::{Page, PageHit};
 use crate::bvh::compact::new_key;
@@ -77,12 +78,12 @@ impl StoredMesh {
         }
         let table: Vec<PageEntry> = bytes.chunks_exact(ENTRY_BYTES).map(PageEntry::read).collect();
         for (number, page) in table.iter().enumerate() {
-            let end = u64::from(page.units) * UNIT_BYTES;
-            if page.offset.checked_add(end).is_none_or(|end| end > at) {
+            if page.end().is_none_or(|end| end > at) {
                 return Err(bad_table(&format!("page {number} lies outside")));
             }
         }
-        let cache = PageCache::new(new_key(), table.len(), budget);
+        let places = if header.attributes.any() { 2 * table.len() } else { table.len() };
+        let cache = PageCache::new(new_key(), places, budget);
         let (level, failure) = (Level::new(), OnceLock::new());
         let source = Box::new(source);
         Ok(StoredMesh { source, header, table, cache, level, failure })
@@ -100,7 +101,14 @@ impl StoredMesh {
             skipped: self.header.skipped,
             pages: self.header.pages,
             bytes: self.header.length,
+            attribute_bytes: self.table.iter().map(|p| 4 * u64::from(p.attribute_words)).sum(),
         }
+    }
+
+    /// What its triangles have beside their corners.
+    pub fn attributes(&self) -> StoredAttributes {
+        let Attributes { normals, colors, scalars, .. } = self.header.attributes;
+        StoredAttributes { normals, colors, scalars }
     }
 
     /// Bounds of all triangles relative to the origin, wider by a little; empty without any.
@@ -117,7 +125,7 @@ impl StoredMesh {
     /// page `page`; the ray is relative to the mesh's origin. `None` when it hits none, or the page
     /// cannot be read ([`StoredMesh::failure`]).
     pub fn triangle(&self, page: u32, ray: &Ray) -> Option<u64> {
-        self.hit(page, ray).map(|hit| hit.triangle)
+        self.hit(page, ray).map(|hit| hit.triangle())
     }
 
     /// Why a page could not be read, the first time that this was so. Rays passed through it.
@@ -126,24 +134,69 @@ impl StoredMesh {
     }
 
     /// Calls `work` with a page. `None` when it cannot be read.
-    fn with_page<R>(&self, number: u32, work: impl FnOnce(&Page) -> R) -> Option<R> {
-        let read =
-            || self.read_page(number).map_err(|e| self.failure.get_or_init(|| e.to_string())).ok();
-        self.cache.with(number, read, work)
+    pub(super) fn with_page<R>(&self, number: u32, work: impl FnOnce(&Page) -> R) -> Option<R> {
+        let page = |part: &Part| match part {
+            Part::Page(page) => Some(work(page)),
+            Part::Attributes(_) => None,
+        };
+        self.cache.with(number, || self.keep_failure(self.read_page(number)), page).flatten()
     }
 
-    fn read_page(&self, number: u32) -> Result<Page, StoredMeshError> {
+    /// What a point of a triangle of a page has beside its place.
+    fn attributes_at(&self, page: u32, id: u32, weights: [f32; 3]) -> HitAttributes {
+        let entry = &self.table[page as usize];
+        if entry.attribute_words == 0 || !self.header.attributes.any() {
+            return HitAttributes::default();
+        }
+        let read = || self.keep_failure(self.read_attributes(page));
+        let at = |part: &Part| match part {
+            Part::Attributes(attributes) => attributes.at(id, weights),
+            Part::Page(_) => HitAttributes::default(),
+        };
+        // Behind the pages.
+        let place = self.table.len() + page as usize;
+        u32::try_from(place)
+            .ok()
+            .and_then(|place| self.cache.with(place, read, at))
+            .unwrap_or_default()
+    }
+
+    /// What was read; keeps the reason where it was not.
+    fn keep_failure(&self, read: Result<Part, StoredMeshError>) -> Option<Part> {
+        read.map_err(|e| self.failure.get_or_init(|| e.to_string())).ok()
+    }
+
+    fn read_page(&self, number: u32) -> Result<Part, StoredMeshError> {
         let entry = &self.table[number as usize];
         let mut units = vec![Unit::ZERO; entry.units as usize];
-        let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut units);
+        let (part, expected) = (format!("page {number}"), entry.checksum);
+        let bytes = bytemuck::cast_slice_mut(&mut units);
+        let bad = self.read_part(&part, entry.offset, bytes, expected)?;
+        Page::of_units(units, entry).map(Part::Page).map_err(bad)
+    }
+
+    fn read_attributes(&self, number: u32) -> Result<Part, StoredMeshError> {
+        let entry = &self.table[number as usize];
+        let mut words = vec![0u32; entry.attribute_words as usize];
+        let (part, expected) =
+            (format!("the attributes of page {number}"), entry.attribute_checksum);
+        let bytes = bytemuck::cast_slice_mut(&mut words);
+        let bad = self.read_part(&part, entry.attributes(), bytes, expected)?;
+        PageAttributes::of_words(words).map(Part::Attributes).map_err(bad)
+    }
+
+    /// Reads a part of the file. Returns what makes an error of what is wrong with it.
+    fn read_part<'a>(
+        &'a self,
+        part: &'a str,
+        offset: u64,
+        bytes: &mut [u8],
+        expected: u32,
+    ) -> Result<impl FnOnce(&str) -> StoredMeshError + 'a, StoredMeshError> {
         let io = |reason| StoredMeshError::Io { name: self.source.name(), reason };
-        self.source.read(entry.offset, bytes).map_err(io)?;
-        let part = format!("page {number}");
-        let bad = |reason: &str| damaged(&*self.source, &part, entry.offset, reason);
-        if checksum(bytes) != entry.checksum {
-            return Err(bad(WRONG_CHECKSUM));
-        }
-        Page::of_units(units, entry).map_err(bad)
+        self.source.read(offset, bytes).map_err(io)?;
+        let bad = move |reason: &str| damaged(&*self.source, part, offset, reason);
+        if checksum(bytes) != expected { Err(bad(WRONG_CHECKSUM)) } else { Ok(bad) }
     }
 
     /// The triangle that the ray hits in a page.
@@ -151,6 +204,18 @@ impl StoredMesh {
         self.table.get(page as usize)?;
         self.with_page(page, |page| page.triangle(self.level, ray)).flatten()
     }
+}
+
+/// What the triangles of a stored mesh have beside their corners; some of them at least.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct StoredAttributes {
+    /// Normals for shading.
+    pub normals: bool,
+    /// Colours.
+    pub colors: bool,
+    /// The smallest and the largest finite scalar, where there are scalars.
+    pub scalars: Option<[f32; 2]>,
 }
 
 const WRONG_CHECKSUM: &str = "its checksum is wrong";
@@ -183,27 +248,38 @@ impl Shape for StoredMesh {
     }
 
     fn surface(&self, page: u32, hit: &ShapeHit, ray: &Ray) -> ShapeSurface {
-        let flat = |point, point_error, normal| ShapeSurface {
+        let surface = |point, point_error, normal, found: HitAttributes| ShapeSurface {
             point,
             point_error,
             normal,
-            scalar: None,
-            color: None,
+            shading_normal: found.normal,
+            scalar: found.scalar,
+            color: found.color,
         };
         // The same hit by a ray that ends there: it meets few boxes.
         let to_hit = Ray { t_min: hit.t, t_max: hit.t.next_up(), ..*ray };
         let found = self.hit(page, &to_hit).or_else(|| self.hit(page, ray));
-        let Some(PageHit { corners, .. }) = found else {
+        let Some(PageHit { corners, id, .. }) = found else {
             // The page could be read for the hit and cannot be read now: the render fails.
-            return flat(ray.at(hit.t), 0.0, -ray.dir.normalize_or_zero());
+            let against = -ray.dir.normalize_or_zero();
+            return surface(ray.at(hit.t), 0.0, against, HitAttributes::default());
         };
+        let attributes = self.attributes_at(page, id, [1.0 - hit.u - hit.v, hit.u, hit.v]);
         let [a, b, c] = corners.map(|p| p.as_dvec3());
         let (e1, e2) = (b - a, c - a);
         let p = a + e1 * f64::from(hit.u) + e2 * f64::from(hit.v);
         // The sum lies in the triangle's plane for any weights, but for the rounding of f64.
         let size = corners.iter().fold(0.0f32, |m, p| m.max(p.abs().max_element()));
         let (point, point_error) = rounded_point(p, 16.0 * f64::EPSILON * f64::from(size));
-        flat(point, point_error, e1.cross(e2).normalize_or_zero().as_vec3())
+        surface(point, point_error, e1.cross(e2).normalize_or_zero().as_vec3(), attributes)
+    }
+
+    fn has_transparency(&self) -> bool {
+        self.header.attributes.transparent
+    }
+
+    fn stored_mesh(&self) -> Option<&StoredMesh> {
+        Some(self)
     }
 
     fn is_costly(&self) -> bool {

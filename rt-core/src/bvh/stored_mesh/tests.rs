@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::bvh::{BuildOptions, Geometry, Instance, World};
-use crate::mesh::{MeshSlices, TriMesh};
-use crate::ray::Ray;
+use crate::mesh::{Attribute, MeshSlices, PerElement, TriMesh};
+use crate::ray::{HitBlock, LANES, Ray, RayBlock};
 use crate::shapes::Shape;
 use crate::test_shapes::Random;
 use glam::{DAffine3, DVec3, Vec3};
@@ -184,8 +184,8 @@ fn bytes_that_were_cut_or_are_something_else_are_refused() {
     let longer = [&whole[..], &[0]].concat();
     assert!(open(&longer).expect("more bytes").contains("bytes, but the header says"));
     let mut other = whole.clone();
-    other[8] = 2;
-    assert!(open(&other).expect("another version").contains("version 2"));
+    other[8] = 3;
+    assert!(open(&other).expect("another version").contains("version 3"));
     let error = open(b"solid ball").expect("another format");
     assert!(error.contains("not a stored mesh"), "{error}");
     let unfinished = [&[0; 128], &whole[128..]].concat();
@@ -286,4 +286,217 @@ fn pages_with_any_bits_and_the_right_checksum_end_in_failures_or_hits_and_never_
         *(if mesh.failure().is_some() { &mut refused } else { &mut traced }) += 1;
     }
     assert!(refused > 100 && traced > 100, "{refused} refused, {traced} traced");
+}
+
+#[test]
+fn files_of_the_first_version_can_be_read() {
+    let (mut bytes, report) = store(&ball(20), 1000);
+    bytes[8] = 1;
+    bytes[12..16].fill(0);
+    let sum = super::format::checksum(&bytes[..128]);
+    bytes[12..16].copy_from_slice(&sum.to_le_bytes());
+    let stored = StoredMesh::open(bytes, 0).expect("version 1");
+    assert_eq!(stored.report(), report);
+    assert!(!stored.attributes().normals && stored.attributes().scalars.is_none());
+}
+
+/// A world of a stored ball, once as it is and once turned, scaled and moved, when `several`.
+fn stored_world(bytes: &[u8], budget: usize, several: bool) -> World {
+    let stored = Arc::new(StoredMesh::open(bytes.to_vec(), budget).expect("sound bytes"));
+    let turned = DAffine3::from_scale_rotation_translation(
+        DVec3::new(0.5, 0.7, -0.6),
+        glam::DQuat::from_rotation_x(0.7),
+        DVec3::new(1.5, 0.2, 0.0),
+    );
+    let places: &[DAffine3] =
+        if several { &[DAffine3::IDENTITY, turned] } else { &[DAffine3::IDENTITY] };
+    let placed =
+        places.iter().map(|&world_from_object| Instance { geometry: 0, world_from_object });
+    let geometries = vec![Geometry::Shape(stored)];
+    World::build(geometries, placed.collect(), &BuildOptions::default()).expect("a world")
+}
+
+#[test]
+fn blocks_and_packets_have_the_hits_of_single_rays_bit_for_bit() {
+    let (bytes, _) = store(&ball(160), 10_000);
+    let mut r = Random::new(11);
+    let eye = Vec3::new(0.3, 0.4, 3.0);
+    // Pixels of an image, and rays with random ends.
+    let mut pixel = |i: usize| {
+        let (x, y) = ((i / 256 % 4 * 16 + i % 16) as f32, (i / 1024 * 16 + i / 16 % 16) as f32);
+        let dir = Vec3::new(x / 32.0 - 1.0, y / 32.0 - 1.0, -2.5) * 0.8;
+        let t_min = if r.unit() < 0.1 { 0.9 } else { 0.0 };
+        Ray { t_min, ..Ray::new(eye, dir) }.with_t_max(if r.unit() < 0.2 { 1.0 } else { 1e9 })
+    };
+    let image: Vec<Ray> = (0..4096).map(&mut pixel).collect();
+    for (budget, several) in [(usize::MAX, false), (400_000, false), (usize::MAX, true)] {
+        let world = stored_world(&bytes, budget, several);
+        for (coherent, all) in [(true, &image), (false, &rays(4096))] {
+            let blocks = RayBlock::from_rays(all);
+            let mut found = vec![HitBlock::MISS; blocks.len()];
+            let mut blocked = vec![0; blocks.len()];
+            if coherent {
+                world.closest_coherent(&blocks, &mut found).expect("as many");
+                world.occluded_coherent(&blocks, &mut blocked).expect("as many");
+            } else {
+                world.closest_incoherent(&blocks, &mut found).expect("as many");
+                world.occluded_incoherent(&blocks, &mut blocked).expect("as many");
+            }
+            let mut hits = 0;
+            for (i, ray) in all.iter().enumerate() {
+                let (block, lane) = (i / LANES, i % LANES);
+                let (hit, expected) = (found[block].get(lane), world.closest(ray));
+                assert_eq!(hit, expected, "{several}, {coherent}: {ray:?}");
+                assert_eq!(blocked[block] >> lane & 1 == 1, world.occluded(ray), "{ray:?}");
+                hits += u32::from(hit.is_some());
+            }
+            assert!(hits > 1500, "{several}, {coherent}: {hits} hits");
+        }
+        assert_eq!(world.failure(), None);
+    }
+}
+
+/// A ball with normals, colours and scalars: of vertices and of triangles in turns.
+fn painted(rings: u32, faces: bool) -> TriMesh {
+    let mut mesh = ball(rings);
+    let of = |n: usize, scale: f32| (0..n).map(move |i| scale * (i as f32 * 0.37).sin());
+    let (vertices, triangles) = (mesh.positions.len(), mesh.indices.len());
+    mesh.normals = Some(if faces {
+        let normal = |i| {
+            let [a, b, c]: [Vec3; 3] = mesh.triangle(i);
+            (b - a).cross(c - a).try_normalize().unwrap_or(Vec3::X)
+        };
+        Attribute::per_face((0..triangles).map(normal).collect())
+    } else {
+        Attribute::per_vertex(mesh.positions.iter().map(|p| p.normalize()).collect())
+    });
+    let colors = |n| of(n, 0.5).map(|x| [0.5 + x, 0.5, 0.25, 1.0]).collect();
+    mesh.colors = Some(if faces {
+        Attribute::per_vertex(colors(vertices))
+    } else {
+        Attribute::per_face(colors(triangles))
+    });
+    mesh.scalars = Some(Attribute::per_vertex(of(vertices, 3.0).collect()));
+    mesh
+}
+
+fn store_painted(mesh: &TriMesh, tolerance: f64) -> (Vec<u8>, StoredMeshReport) {
+    let mut writer = StoredMeshWriter::new(Vec::new(), mesh.origin).expect("memory");
+    writer.set_normal_tolerance(tolerance);
+    writer.add_mesh(mesh).expect("a sound mesh");
+    writer.finish().expect("a sound mesh")
+}
+
+#[test]
+fn surfaces_have_the_attributes_of_the_mesh_bit_for_bit_and_normals_within_the_tolerance() {
+    for (faces, tolerance) in [(false, 0.0), (true, 0.0), (false, 0.5), (true, 0.01)] {
+        let mesh = painted(120, faces);
+        let (bytes, report) = store_painted(&mesh, tolerance);
+        assert!(report.pages > 8 && report.attribute_bytes > 0, "{report:?}");
+        let stored = StoredMesh::open(bytes, 1 << 20).expect("sound bytes");
+        assert_eq!(stored.report(), report);
+        let [low, high] = stored.attributes().scalars.expect("scalars");
+        assert!(low < -2.9 && high > 2.9, "{low} to {high}");
+        let mut hits = 0;
+        for ray in rays(300) {
+            for page in 0..stored.num_primitives() as u32 {
+                let Some(hit) = stored.closest(page, &ray) else { continue };
+                hits += 1;
+                let surface = stored.surface(page, &hit, &ray);
+                let number = stored.triangle(page, &ray).expect("the same hit") as usize;
+                let corner = mesh.indices[number].map(|k| k as usize);
+                let [w, u, v] = [1.0 - hit.u - hit.v, hit.u, hit.v];
+                let normals = mesh.normals.as_ref().expect("normals");
+                let normal = match normals.per {
+                    PerElement::Face => normals.values[number],
+                    PerElement::Vertex => {
+                        let [x, y, z] = corner.map(|k| normals.values[k]);
+                        x * w + y * u + z * v
+                    }
+                };
+                let found = surface.shading_normal.expect("a normal");
+                if tolerance == 0.0 {
+                    assert_eq!(found, normal);
+                } else {
+                    let (a, b) = (found.as_dvec3(), normal.as_dvec3());
+                    let angle = a.cross(b).length().atan2(a.dot(b)).to_degrees();
+                    assert!(angle <= tolerance * 1.01, "{angle} degrees of {tolerance}");
+                }
+                let [x, y, z] = corner.map(|k| mesh.scalars.as_ref().expect("scalars").values[k]);
+                assert_eq!(surface.scalar, Some(x * w + y * u + z * v));
+                let colors = mesh.colors.as_ref().expect("colours");
+                let color = match colors.per {
+                    PerElement::Face => colors.values[number],
+                    PerElement::Vertex => {
+                        let [x, y, z] = corner.map(|k| colors.values[k]);
+                        std::array::from_fn(|c| x[c] * w + y[c] * u + z[c] * v)
+                    }
+                };
+                assert_eq!(surface.color, Some(color));
+            }
+        }
+        assert!(hits > 150, "{hits}");
+        assert!(!stored.has_transparency());
+    }
+}
+
+#[test]
+fn normals_within_a_tolerance_take_less_than_those_as_given() {
+    let mut mesh = painted(120, false);
+    (mesh.colors, mesh.scalars) = (None, None);
+    let [exact, near] = [0.0, 0.1].map(|tolerance| store_painted(&mesh, tolerance).1);
+    let bytes = |r: StoredMeshReport| r.attribute_bytes as f64 / r.triangles as f64;
+    assert!(bytes(exact) < 13.0 && bytes(near) < 8.5, "{} and {}", bytes(exact), bytes(near));
+}
+
+#[test]
+fn pieces_with_other_attributes_keep_their_own() {
+    let (plain, mut painted) = (ball(30), painted(30, false));
+    painted.colors.as_mut().expect("colours").values[7][3] = 0.5;
+    let mut writer = StoredMeshWriter::new(Vec::new(), DVec3::ZERO).expect("memory");
+    writer.add(&MeshSlices::of_mesh(&plain)).expect("a piece");
+    writer.add_mesh(&painted).expect("a piece");
+    writer.add(&MeshSlices::of_mesh(&plain)).expect("a piece");
+    let mut wrong = painted.clone();
+    wrong.scalars.as_mut().expect("scalars").values.pop();
+    let error = writer.add_mesh(&wrong).expect_err("a scalar too few");
+    assert!(error.to_string().starts_with("piece 3 "), "{error}");
+    let (bytes, _) = writer.finish().expect("a sound mesh");
+    let stored = StoredMesh::open(bytes, 1 << 20).expect("sound bytes");
+    assert!(stored.has_transparency());
+    let (mut with, mut without) = (0, 0);
+    for ray in rays(100) {
+        for page in 0..stored.num_primitives() as u32 {
+            let Some(hit) = stored.closest(page, &ray) else { continue };
+            let surface = stored.surface(page, &hit, &ray);
+            let own = stored.triangle(page, &ray).expect("the same hit");
+            let own = (1800 * 2..2 * 1800 * 2).contains(&own);
+            assert_eq!((surface.color.is_some(), surface.shading_normal.is_some()), (own, own));
+            if own { with += 1 } else { without += 1 }
+        }
+    }
+    assert!(with > 20 && without > 40, "{with} and {without}");
+}
+
+#[test]
+fn attributes_that_change_below_us_are_a_failure_and_damaged_words_never_panic() {
+    let mesh = painted(40, false);
+    let (bytes, report) = store_painted(&mesh, 0.1);
+    let ray = Ray::new(Vec3::new(0.1, 0.2, -3.0), Vec3::Z);
+    let plain = store(&mesh, usize::MAX / 3).1;
+    // Behind the page's tree, which is that of the mesh without attributes.
+    let at = 128 + (plain.bytes - 128 - 64 * plain.pages) as usize / plain.pages as usize + 8;
+    assert!(report.attribute_bytes > 64 && report.pages == plain.pages, "{report:?}");
+    let mut damaged = bytes.clone();
+    damaged[at] ^= 1;
+    let stored = StoredMesh::open(damaged, 1 << 20).expect("the header and table are sound");
+    for page in 0..stored.num_primitives() as u32 {
+        if let Some(hit) = stored.closest(page, &ray) {
+            stored.surface(page, &hit, &ray);
+        }
+    }
+    if stored.failure().is_none() {
+        // The damage was in a page's tree after all, or in attributes that nothing asked for.
+        panic!("damage at {at} was not noticed");
+    }
 }

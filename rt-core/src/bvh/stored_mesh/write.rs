@@ -1,16 +1,19 @@
 //! Stores a mesh piece by piece.
 
+use super::attributes::{self, MeshAttributes};
 use super::bytes::PageSink;
 use super::error::StoredMeshError;
-use super::format::{ENTRY_BYTES, HEADER_BYTES, Header, PageEntry, UNIT_BYTES, checksum};
+use super::format::{
+    Attributes, ENTRY_BYTES, HEADER_BYTES, Header, PageEntry, UNIT_BYTES, checksum,
+};
 use crate::bvh::build::UNWATCHED;
 use crate::bvh::compact::{CompactBvh, divide};
 use crate::bvh::layout::local_frame::LocalFrame;
 use crate::bvh::layout::triangles::TriWriter;
 use crate::bvh::options::BuildQuality;
 use crate::math::Aabb;
-use crate::mesh::MeshSlices;
-use glam::DVec3;
+use crate::mesh::{Attribute, MeshSlices, PerElement, TriMesh};
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 /// Most triangles of a page: about 57 kB.
@@ -73,7 +76,12 @@ pub struct StoredMeshWriter<S> {
     table: Vec<PageEntry>,
     bounds: Aabb,
     waiting: Waiting,
-    most_waiting: usize,
+    /// Bytes for triangles that wait.
+    memory: usize,
+    normal_tolerance: f64,
+    /// Of the pages written so far.
+    attributes: Attributes,
+    attribute_bytes: u64,
 }
 
 /// What a file has.
@@ -88,6 +96,8 @@ pub struct StoredMeshReport {
     pub pages: u64,
     /// Bytes of the file.
     pub bytes: u64,
+    /// Those of them that normals, colours and scalars take.
+    pub attribute_bytes: u64,
 }
 
 /// Triangles of small pieces, with their own vertices.
@@ -95,6 +105,10 @@ pub struct StoredMeshReport {
 struct Waiting {
     positions: Vec<f32>,
     indices: Vec<u32>,
+    /// All of them have the same.
+    normals: Option<Attribute<Vec3>>,
+    colors: Option<Attribute<[f32; 4]>>,
+    scalars: Option<Attribute<f32>>,
 }
 
 impl<S: PageSink> StoredMeshWriter<S> {
@@ -120,7 +134,10 @@ impl<S: PageSink> StoredMeshWriter<S> {
             table: Vec::new(),
             bounds: Aabb::EMPTY,
             waiting: Waiting::default(),
-            most_waiting: DEFAULT_MEMORY / WAITING_BYTES,
+            memory: DEFAULT_MEMORY,
+            normal_tolerance: 0.0,
+            attributes: Attributes::default(),
+            attribute_bytes: 0,
         })
     }
 
@@ -131,15 +148,47 @@ impl<S: PageSink> StoredMeshWriter<S> {
 
     /// Bytes that small pieces may take while they wait for others; 1 GiB without it.
     pub fn set_memory(&mut self, bytes: usize) {
-        self.most_waiting = bytes / WAITING_BYTES;
+        self.memory = bytes;
     }
 
-    /// Adds a piece. Its triangles get the numbers after those of the pieces before it. Triangles
-    /// that cannot be hit are counted, and keep their numbers.
+    /// The angle in degrees by which stored normals may be off, from here on: they are stored with
+    /// unit length, in as few bits as it allows. As given, in 96 bits, with 0 and without it.
+    pub fn set_normal_tolerance(&mut self, degrees: f64) {
+        self.normal_tolerance = degrees;
+    }
+
+    /// Adds a piece without attributes: its surface is flat shaded. Its triangles get the numbers
+    /// after those of the pieces before it. Triangles that cannot be hit are counted, and keep
+    /// their numbers.
     ///
     /// # Errors
     /// When the piece is invalid or has another origin, or the sink takes no bytes.
     pub fn add(&mut self, piece: &MeshSlices<'_>) -> Result<(), StoredMeshError> {
+        self.add_piece(piece, &MeshAttributes::default())
+    }
+
+    /// Adds a piece with its normals, colours and scalars. Texture coordinates and tangents are not
+    /// stored. As [`StoredMeshWriter::add`] otherwise.
+    ///
+    /// # Errors
+    /// As [`StoredMeshWriter::add`], and when an attribute has another number of values than the
+    /// mesh has vertices or triangles.
+    pub fn add_mesh(&mut self, piece: &TriMesh) -> Result<(), StoredMeshError> {
+        let number = self.pieces;
+        piece.check().map_err(|source| StoredMeshError::Mesh { piece: number, source })?;
+        let attributes = MeshAttributes {
+            normals: piece.normals.as_ref(),
+            colors: piece.colors.as_ref(),
+            scalars: piece.scalars.as_ref(),
+        };
+        self.add_piece(&MeshSlices::of_mesh(piece), &attributes)
+    }
+
+    fn add_piece(
+        &mut self,
+        piece: &MeshSlices<'_>,
+        attributes: &MeshAttributes<'_>,
+    ) -> Result<(), StoredMeshError> {
         let number = self.pieces;
         piece.check().map_err(|source| StoredMeshError::Mesh { piece: number, source })?;
         if piece.origin != self.origin {
@@ -150,15 +199,17 @@ impl<S: PageSink> StoredMeshWriter<S> {
             });
         }
         self.pieces += 1;
-        let small = piece.num_triangles() <= self.most_waiting;
-        if !small || self.waiting.indices.len() / 3 + piece.num_triangles() > self.most_waiting {
+        let most = self.memory / waiting_bytes(attributes);
+        let small = piece.num_triangles() <= most;
+        let full = self.waiting.indices.len() / 3 + piece.num_triangles() > most;
+        if !small || full || !self.waiting.has_those_of(attributes) {
             self.write_waiting()?;
         }
         if small {
-            self.waiting.push(piece);
+            self.waiting.push(piece, attributes);
             return Ok(());
         }
-        self.write(piece)
+        self.write(piece, attributes)
     }
 
     /// Writes what waits, the table and the header. Returns the sink, and what it has.
@@ -182,6 +233,7 @@ impl<S: PageSink> StoredMeshWriter<S> {
             origin: self.origin,
             bounds: self.bounds,
             table_checksum: checksum(&table),
+            attributes: self.attributes,
         };
         let written = self.sink.append(&table);
         let written = written.and_then(|()| self.sink.replace_start(&header.bytes()));
@@ -191,6 +243,7 @@ impl<S: PageSink> StoredMeshWriter<S> {
             skipped: header.skipped,
             pages: header.pages,
             bytes: header.length,
+            attribute_bytes: self.attribute_bytes,
         };
         Ok((self.sink, report))
     }
@@ -201,11 +254,21 @@ impl<S: PageSink> StoredMeshWriter<S> {
             origin: self.origin,
             ..MeshSlices::new(&waiting.positions, &waiting.indices)
         };
-        self.write(&mesh)
+        let Waiting { normals, colors, scalars, .. } = &waiting;
+        let attributes = MeshAttributes {
+            normals: normals.as_ref(),
+            colors: colors.as_ref(),
+            scalars: scalars.as_ref(),
+        };
+        self.write(&mesh, &attributes)
     }
 
     /// Builds the pages of a mesh and writes them.
-    fn write(&mut self, mesh: &MeshSlices<'_>) -> Result<(), StoredMeshError> {
+    fn write(
+        &mut self,
+        mesh: &MeshSlices<'_>,
+        attributes: &MeshAttributes<'_>,
+    ) -> Result<(), StoredMeshError> {
         let (mesh, count) = (mesh.triangles(), mesh.num_triangles());
         if count == 0 {
             return Ok(());
@@ -223,24 +286,43 @@ impl<S: PageSink> StoredMeshWriter<S> {
         for ranges in ranges.chunks(PAGES_AT_ONCE) {
             let build = |range: &std::ops::Range<usize>| {
                 let ids = ids[range.clone()].to_vec();
-                CompactBvh::of_triangles(&triangles, ids, self.quality, &UNWATCHED).expect(watched)
+                let words = if attributes.any() {
+                    let corners = |id: u32| mesh.indices[id as usize];
+                    attributes::encode(ids.clone(), corners, attributes, self.normal_tolerance)
+                } else {
+                    Vec::new()
+                };
+                let tree = CompactBvh::of_triangles(&triangles, ids, self.quality, &UNWATCHED);
+                (tree.expect(watched), words)
             };
-            let trees: Vec<CompactBvh> = ranges.par_iter().map(build).collect();
-            for (tree, range) in trees.iter().zip(ranges).filter(|(_, range)| !range.is_empty()) {
-                self.write_page(tree, range.len() as u32)?;
+            let pages: Vec<(CompactBvh, Vec<u32>)> = ranges.par_iter().map(build).collect();
+            for ((tree, words), range) in pages.iter().zip(ranges) {
+                if !range.is_empty() {
+                    self.write_page(tree, range.len() as u32, words)?;
+                }
             }
+        }
+        if !ids.is_empty() {
+            self.attributes.include(attributes);
         }
         self.triangles += count as u64;
         Ok(())
     }
 
-    fn write_page(&mut self, tree: &CompactBvh, triangles: u32) -> Result<(), StoredMeshError> {
+    fn write_page(
+        &mut self,
+        tree: &CompactBvh,
+        triangles: u32,
+        attributes: &[u32],
+    ) -> Result<(), StoredMeshError> {
         let most = u64::from(u32::MAX) - 1;
         if self.table.len() as u64 >= most {
             return Err(StoredMeshError::TooManyPages { found: most + 1, most });
         }
         let bytes: &[u8] = bytemuck::cast_slice(&tree.bvh.units);
         self.sink.append(bytes).map_err(|reason| unwritable(&self.sink, reason))?;
+        let words: &[u8] = bytemuck::cast_slice(attributes);
+        self.sink.append(words).map_err(|reason| unwritable(&self.sink, reason))?;
         self.table.push(PageEntry {
             offset: self.length,
             first: self.triangles,
@@ -249,23 +331,65 @@ impl<S: PageSink> StoredMeshWriter<S> {
             depth: tree.bvh.depth as u32,
             checksum: checksum(bytes),
             bounds: tree.bvh.bounds,
+            attribute_words: attributes.len() as u32,
+            attribute_checksum: checksum(words),
         });
-        self.length += bytes.len() as u64;
+        self.length += (bytes.len() + words.len()) as u64;
+        self.attribute_bytes += words.len() as u64;
         self.bounds = self.bounds.union(tree.bvh.bounds);
         Ok(())
     }
 }
 
+/// Bytes of memory for a triangle that waits.
+fn waiting_bytes(attributes: &MeshAttributes<'_>) -> usize {
+    fn of<T>(a: Option<&Attribute<T>>) -> usize {
+        a.map_or(0, |a| if a.per == PerElement::Vertex { 3 } else { 1 } * size_of::<T>())
+    }
+    WAITING_BYTES + of(attributes.normals) + of(attributes.colors) + of(attributes.scalars)
+}
+
 impl Waiting {
-    /// Adds the corners of a piece's triangles. Its vertices alone could be many more than the
-    /// triangles need; pages store equal corners once.
-    fn push(&mut self, piece: &MeshSlices<'_>) {
-        let piece = piece.triangles();
-        for i in 0..piece.indices.len() as u32 {
+    /// Whether a piece with these attributes can wait together with what is here.
+    fn has_those_of(&self, attributes: &MeshAttributes<'_>) -> bool {
+        fn per<T>(a: Option<&Attribute<T>>) -> Option<PerElement> {
+            a.map(|a| a.per)
+        }
+        self.indices.is_empty()
+            || per(self.normals.as_ref()) == per(attributes.normals)
+                && per(self.colors.as_ref()) == per(attributes.colors)
+                && per(self.scalars.as_ref()) == per(attributes.scalars)
+    }
+
+    /// Adds the corners of a piece's triangles, and what they have. Its vertices alone could be
+    /// many more than the triangles need; pages store equal corners, and equal values, once.
+    fn push(&mut self, piece: &MeshSlices<'_>, attributes: &MeshAttributes<'_>) {
+        let triangles = piece.triangles();
+        for i in 0..triangles.indices.len() as u32 {
             let first = (self.positions.len() / 3) as u32;
-            self.positions.extend(piece.corners(i).iter().flat_map(|p| p.to_array()));
+            self.positions.extend(triangles.corners(i).iter().flat_map(|p| p.to_array()));
             self.indices.extend([first, first + 1, first + 2]);
         }
+        append(&mut self.normals, attributes.normals, piece.indices);
+        append(&mut self.colors, attributes.colors, piece.indices);
+        append(&mut self.scalars, attributes.scalars, piece.indices);
+    }
+}
+
+/// Appends what the corners `indices`, three a triangle, or the triangles have.
+fn append<T: Copy + Default>(
+    all: &mut Option<Attribute<T>>,
+    piece: Option<&Attribute<T>>,
+    indices: &[u32],
+) {
+    let Some(piece) = piece else { return };
+    let all = all.get_or_insert_with(|| Attribute { per: piece.per, values: Vec::new() });
+    match piece.per {
+        // Corners that do not exist are those of triangles that are left out.
+        PerElement::Vertex => all.values.extend(
+            indices.iter().map(|&i| piece.values.get(i as usize).copied().unwrap_or_default()),
+        ),
+        PerElement::Face => all.values.extend_from_slice(&piece.values),
     }
 }
 

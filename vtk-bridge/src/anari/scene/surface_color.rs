@@ -230,6 +230,7 @@ impl Shape for TriangleShape {
             point: rounded,
             point_error,
             normal: normal.as_vec3(),
+            shading_normal: None,
             scalar: None,
             color: None,
         }

@@ -7,7 +7,7 @@ use crate::bvh::layout::wide::ChildRef;
 use crate::bvh::query::HitQuery;
 use crate::bvh::traverse::packet::GROUPS;
 use crate::bvh::traverse::tree_view::TreeView;
-use crate::ray::LANES;
+use crate::ray::{HitBlock, LANES, NO_HIT};
 use fearless_simd::Simd;
 
 /// What the rays of a packet still search for.
@@ -16,6 +16,20 @@ pub(crate) struct RaysLeft<'p> {
     pub(crate) t: &'p mut [Row; GROUPS],
     /// Lanes that still search, per group.
     pub(crate) active: &'p mut [u16; GROUPS],
+}
+
+impl RaysLeft<'_> {
+    /// Nothing farther than `hits` is searched by the rays of group `g`; for occlusion, nothing by
+    /// those that are blocked.
+    #[inline(always)]
+    pub(crate) fn lower<Q: HitQuery>(&mut self, g: usize, hits: &HitBlock) {
+        for lane in 0..LANES {
+            let found = hits.prim[lane] != NO_HIT;
+            let t = if Q::ANY { -1.0 } else { hits.t[lane] };
+            self.t[g][lane] = if found { t } else { self.t[g][lane] };
+            self.active[g] &= !(u16::from(Q::ANY & found) << lane);
+        }
+    }
 }
 
 /// Traces what the leaves of the upper level refer to.
