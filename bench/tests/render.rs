@@ -308,3 +308,45 @@ fn a_stored_mesh_has_the_picture_of_the_mesh_in_memory() {
     assert_eq!(said["attribute_bytes"], 0);
     assert!(pixels(&stored) != expected);
 }
+
+#[test]
+fn pieces_of_stl_and_of_parallel_files_are_stored_one_after_the_other() {
+    let dir = tempfile::tempdir().unwrap();
+    let of = |name: &str| dir.path().join(name).display().to_string();
+    let (mesh, stored) = (ball(), of("ball.rtmesh"));
+    let store = |file: &str| -> Value {
+        let made = bench(&["store", file, "-o", &stored, "--json"]);
+        assert!(made.status.success(), "{file}: {}", String::from_utf8_lossy(&made.stderr));
+        serde_json::from_slice(&made.stdout).unwrap()
+    };
+    let mut stl = vec![0; 80];
+    stl.extend((mesh.num_triangles() as u32).to_le_bytes());
+    for t in 0..mesh.num_triangles() {
+        stl.extend([0; 12]);
+        let corners: [glam::Vec3; 3] = mesh.triangle(t);
+        stl.extend(corners.iter().flat_map(|p| p.to_array()).flat_map(f32::to_le_bytes));
+        stl.extend([0; 2]);
+    }
+    std::fs::write(of("ball.stl"), &stl).unwrap();
+    let said = store(&of("ball.stl"));
+    assert_eq!((&said["triangles"], &said["attribute_bytes"]), (&1280.into(), &0.into()));
+    // Cut, it is no binary file any more, and the reader of whole files says what is wrong.
+    std::fs::write(of("cut.stl"), &stl[..5000]).unwrap();
+    let refused = bench(&["store", &of("cut.stl"), "-o", &stored]);
+    let text = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert!(refused.status.code() == Some(1) && text.contains("cut.stl"), "{text}");
+
+    // Two halves, the second far from the first.
+    let mut far = mesh.clone();
+    far.positions.iter_mut().for_each(|p| p.x += 3.0);
+    for (name, mesh) in [("a.vtp", &mesh), ("b.vtp", &far)] {
+        let poly = Dataset::PolyData(PolyData::from_trimesh(mesh));
+        write_vtk(&dir.path().join(name), &poly, VtkOptions::default()).unwrap();
+    }
+    let list = r#"<VTKFile type="PPolyData"><PPolyData>
+        <Piece Source="a.vtp"/><Piece Source="b.vtp"/></PPolyData></VTKFile>"#;
+    std::fs::write(of("both.pvtp"), list).unwrap();
+    let said = store(&of("both.pvtp"));
+    assert_eq!(said["triangles"], 2560);
+    assert!(said["attribute_bytes"].as_u64().unwrap() > 0, "{said}");
+}

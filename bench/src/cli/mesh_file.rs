@@ -5,6 +5,7 @@ use crate::meshes::MeshScene;
 use anyhow::Context as _;
 use datasets::cli::{CommonArgs, UsageError};
 use rt_core::bvh::Geometry;
+use rt_core::glam::DVec3;
 use rt_core::mesh::TriMesh;
 use std::path::Path;
 use std::sync::Arc;
@@ -49,8 +50,13 @@ pub(super) fn read_mesh(common: CommonArgs, file: &Path) -> anyhow::Result<MeshS
 }
 
 /// The meshes relative to the origin of the first, and how many had another one.
-pub(super) fn with_one_origin(meshes: Vec<Arc<TriMesh>>) -> (Vec<Arc<TriMesh>>, usize) {
+fn with_one_origin(meshes: Vec<Arc<TriMesh>>) -> (Vec<Arc<TriMesh>>, usize) {
     let Some(origin) = meshes.first().map(|m| m.origin) else { return (meshes, 0) };
+    with_origin(meshes, origin)
+}
+
+/// The meshes relative to `origin`, and how many had another one.
+pub(super) fn with_origin(meshes: Vec<Arc<TriMesh>>, origin: DVec3) -> (Vec<Arc<TriMesh>>, usize) {
     let mut moved = 0;
     let move_one = |mesh: Arc<TriMesh>| {
         if mesh.origin == origin {

@@ -1,18 +1,22 @@
 //! `bench store`: writes meshes to files that are larger than memory.
 
 use super::StoreArgs;
-use super::mesh_file::with_one_origin;
+use super::mesh_file::with_origin;
 use crate::image::subject::{LoadOptions, PartColoring, Subject};
 use anyhow::Context as _;
 use datasets::cli::{Cancel, CommonArgs, CureExt as _, UsageError};
 use datasets::generate::nested_wavelet::{POINTS, isovalues_for};
 use datasets::generate::wavelet::Wavelet;
 use datasets::isosurface::{self, Options};
+use datasets::read::stl_pieces::StlPieces;
+use datasets::read::vtk_xml::{PieceFiles, piece_files};
 use datasets::stored_mesh::{self, StoredMeshFile};
 use rt_core::bvh::{Geometry, StoredMeshError, StoredMeshReport, StoredMeshWriter};
 use rt_core::glam::DVec3;
 use rt_core::mesh::{MeshSlices, TriMesh};
 use serde_json::json;
+use std::path::Path;
+use std::sync::Arc;
 use std::time::Instant;
 
 pub(super) const EXAMPLES: &str = "\
@@ -59,14 +63,81 @@ pub(super) fn store(common: CommonArgs, args: &StoreArgs) -> anyhow::Result<()> 
     })
 }
 
-/// The triangles of a file, mesh by mesh.
+/// Triangles of a file that is read in pieces.
+const PIECE: usize = 1 << 20;
+
+/// The triangles of a file: in pieces where its format allows it, else mesh by mesh.
 fn store_file(
     common: CommonArgs,
     args: &StoreArgs,
-    file: &std::path::Path,
+    file: &Path,
     memory: usize,
     cancel: &Cancel,
 ) -> anyhow::Result<StoredMeshReport> {
+    let named =
+        |extension: &str| file.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension));
+    if named("stl")
+        && args.color_by.is_none()
+        && let Some(pieces) = StlPieces::open(file, PIECE)?
+    {
+        return store_stl(common, args, pieces, memory, cancel);
+    }
+    // The surface of a volume's pieces would have the faces between them.
+    if named("pvtp")
+        && let Some(PieceFiles { files, .. }) = piece_files(file)?
+    {
+        let mut stored = None;
+        for (number, piece) in files.iter().enumerate() {
+            common.note(1, format_args!("piece {} of {}", number + 1, files.len()));
+            let meshes = triangles_of(common, args, piece)?;
+            if !meshes.is_empty() {
+                add_all(common, args, meshes, &mut stored, memory, cancel)?;
+            }
+        }
+        return finish(file, stored);
+    }
+    let (mut stored, meshes) = (None, triangles_of(common, args, file)?);
+    add_all(common, args, meshes, &mut stored, memory, cancel)?;
+    finish(file, stored)
+}
+
+/// A file that is being written, and the origin of its positions.
+type Stored = (StoredMeshWriter<StoredMeshFile>, DVec3);
+
+fn finish(file: &Path, stored: Option<Stored>) -> anyhow::Result<StoredMeshReport> {
+    let Some((writer, _)) = stored else {
+        let shown = file.display();
+        let text = format!("{shown} has no triangles; `bench render {shown}` shows what it has");
+        return Err(UsageError(text).into());
+    };
+    Ok(stored_mesh::finish(writer)?)
+}
+
+fn store_stl(
+    common: CommonArgs,
+    args: &StoreArgs,
+    pieces: StlPieces,
+    memory: usize,
+    cancel: &Cancel,
+) -> anyhow::Result<StoredMeshReport> {
+    let mut writer = stored_mesh::create(&args.out, DVec3::ZERO)?;
+    writer.set_memory(memory);
+    let bar = common.progress(pieces.triangles(), "storing");
+    for piece in pieces {
+        cancel.check()?;
+        let piece = piece?;
+        writer.add(&MeshSlices::of_mesh(&piece))?;
+        bar.inc(piece.num_triangles() as u64);
+    }
+    Ok(stored_mesh::finish(writer)?)
+}
+
+/// The meshes of a file that is read whole.
+fn triangles_of(
+    common: CommonArgs,
+    args: &StoreArgs,
+    file: &Path,
+) -> anyhow::Result<Vec<Arc<TriMesh>>> {
     let shown = file.display();
     let opened = datasets::read::open(file)?;
     let options = LoadOptions {
@@ -96,10 +167,6 @@ fn store_file(
             Geometry::Shape(_) | Geometry::Slices(_) => None,
         })
         .collect();
-    let Some(first) = meshes.first() else {
-        let text = format!("{shown} has no triangles; `bench render {shown}` shows what it has");
-        return Err(UsageError(text).into());
-    };
     if meshes.len() < all {
         let left_out = all - meshes.len();
         common.warn(format_args!("{shown}: {left_out} parts that are not triangles are left out"));
@@ -107,21 +174,39 @@ fn store_file(
     if meshes.iter().any(|mesh| mesh.texcoords.is_some()) && !args.no_attributes {
         common.warn(format_args!("{shown}: texture coordinates are not stored"));
     }
-    let origin = first.origin;
-    let (meshes, moved) = with_one_origin(meshes);
+    Ok(meshes)
+}
+
+/// Adds meshes to the file, which the first of them starts.
+fn add_all(
+    common: CommonArgs,
+    args: &StoreArgs,
+    meshes: Vec<Arc<TriMesh>>,
+    stored: &mut Option<Stored>,
+    memory: usize,
+    cancel: &Cancel,
+) -> anyhow::Result<()> {
+    let Some(first) = meshes.first() else { return Ok(()) };
+    let (writer, origin) = match stored {
+        Some(stored) => stored,
+        None => {
+            let mut writer = stored_mesh::create(&args.out, first.origin)?;
+            writer.set_memory(memory);
+            writer.set_normal_tolerance(args.normal_tolerance);
+            stored.insert((writer, first.origin))
+        }
+    };
+    let (meshes, moved) = with_origin(meshes, *origin);
     if moved > 0 {
-        common.note(0, format_args!("{shown}: {moved} meshes moved to the origin of the first"));
+        common.note(0, format_args!("{moved} meshes moved to the origin of the first"));
     }
-    let mut writer = stored_mesh::create(&args.out, origin)?;
-    writer.set_memory(memory);
-    writer.set_normal_tolerance(args.normal_tolerance);
     let bar = common.progress(meshes.len() as u64, "storing");
     for (number, mesh) in meshes.into_iter().enumerate() {
         cancel.check()?;
-        add(&mut writer, args, &mesh)?;
+        add(writer, args, &mesh)?;
         bar.set_position(number as u64 + 1);
     }
-    Ok(stored_mesh::finish(writer)?)
+    Ok(())
 }
 
 /// Nested isosurfaces of the wavelet, one after the other: the dissertation's scaling series

@@ -30,6 +30,7 @@ pub mod ply;
 pub mod raw;
 pub mod scene;
 pub mod stl;
+pub mod stl_pieces;
 mod tecplot;
 pub(crate) mod time_axis;
 pub(crate) mod volume;

@@ -13,8 +13,8 @@ use std::path::Path;
 pub(crate) const FORMAT: &str = "STL";
 
 /// Header, count, then 50 bytes per triangle.
-const HEADER_BYTES: usize = 80;
-const TRIANGLE_BYTES: usize = 50;
+pub(super) const HEADER_BYTES: usize = 80;
+pub(super) const TRIANGLE_BYTES: usize = 50;
 
 /// Reads a `.stl` file.
 pub fn read(path: &Path) -> Result<LoadedFile, ReadError> {
