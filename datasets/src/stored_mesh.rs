@@ -51,7 +51,7 @@ pub fn create(
     origin: DVec3,
 ) -> Result<StoredMeshWriter<StoredMeshFile>, StoredMeshError> {
     let file = PartialFile::create(path).map_err(|e| error(path, "cannot create it", &e))?;
-    StoredMeshWriter::new(StoredMeshFile(file), origin)
+    StoredMeshWriter::new(StoredMeshFile { file, written: 0 }, origin)
 }
 
 /// Completes a file and gives it its name.
@@ -61,8 +61,11 @@ pub fn create(
 pub fn finish(
     writer: StoredMeshWriter<StoredMeshFile>,
 ) -> Result<StoredMeshReport, StoredMeshError> {
-    let (StoredMeshFile(mut file), report) = writer.finish()?;
-    file.complete().map_err(|e| error(&file.path, "cannot write it", &e))?;
+    let (mut sink, report) = writer.finish()?;
+    sink.file.complete().map_err(|e| {
+        let (name, reason) = (sink.name(), sink.unwritable(sink.written, &e));
+        StoredMeshError::Io { name, reason }
+    })?;
     Ok(report)
 }
 
@@ -114,21 +117,43 @@ fn read_at(file: &File, mut bytes: &mut [u8], mut offset: u64) -> io::Result<()>
 }
 
 /// A file that gets its name when it is complete.
-pub struct StoredMeshFile(PartialFile);
+pub struct StoredMeshFile {
+    file: PartialFile,
+    /// Bytes given so far.
+    written: u64,
+}
+
+impl StoredMeshFile {
+    /// Why bytes from `offset` on could not be written.
+    fn unwritable(&self, offset: u64, source: &io::Error) -> String {
+        let cure = match source.kind() {
+            io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
+                "; make room, or write to another disk"
+            }
+            _ => "",
+        };
+        format!("cannot write it from byte {offset} on: {source}{cure}")
+    }
+}
 
 impl PageSink for StoredMeshFile {
     fn name(&self) -> String {
-        self.0.path.display().to_string()
+        self.file.path.display().to_string()
     }
 
     fn append(&mut self, bytes: &[u8]) -> Result<(), String> {
-        self.0.writer.write_all(bytes).map_err(|e| format!("cannot write it: {e}"))
+        let offset = self.written;
+        self.file.writer.write_all(bytes).map_err(|e| self.unwritable(offset, &e))?;
+        self.written += bytes.len() as u64;
+        Ok(())
     }
 
     fn replace_start(&mut self, bytes: &[u8]) -> Result<(), String> {
-        let start = self.0.writer.seek(SeekFrom::Start(0));
-        start
-            .and_then(|_| self.0.writer.write_all(bytes))
-            .map_err(|e| format!("cannot write it: {e}"))
+        // What is still in the buffer is written first.
+        let flushed = self.file.writer.flush();
+        flushed.map_err(|e| self.unwritable(self.written, &e))?;
+        let writer = &mut self.file.writer;
+        let replaced = writer.seek(SeekFrom::Start(0)).and_then(|_| writer.write_all(bytes));
+        replaced.map_err(|e| self.unwritable(0, &e))
     }
 }
