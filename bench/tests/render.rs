@@ -341,7 +341,7 @@ fn pieces_of_stl_and_of_parallel_files_are_stored_one_after_the_other() {
     far.positions.iter_mut().for_each(|p| p.x += 3.0);
     for (name, mesh) in [("a.vtp", &mesh), ("b.vtp", &far)] {
         let poly = Dataset::PolyData(PolyData::from_trimesh(mesh));
-        write_vtk(&dir.path().join(name), &poly, VtkOptions::default()).unwrap();
+        write_vtk(dir.path().join(name), &poly, VtkOptions::default()).unwrap();
     }
     let list = r#"<VTKFile type="PPolyData"><PPolyData>
         <Piece Source="a.vtp"/><Piece Source="b.vtp"/></PPolyData></VTKFile>"#;

@@ -204,7 +204,7 @@ impl Subject {
     /// The triangles of a file that is larger than memory.
     pub fn from_stored(mesh: &Arc<StoredMesh>) -> Subject {
         let mut subject = Subject::empty(DVec3::Z);
-        let (report, bounds) = (mesh.report(), mesh.bounds_of_all());
+        let report = mesh.report();
         subject.contents.push(format!("{} stored triangles", report.triangles));
         if report.skipped > 0 {
             subject.warnings.push(format!(
@@ -212,12 +212,11 @@ impl Subject {
                 report.skipped
             ));
         }
-        let outline = if bounds.is_empty() {
-            vec![]
-        } else {
-            let at = |corner: Vec3| mesh.origin() + corner.as_dvec3();
-            corners_of_box(at(bounds.min), at(bounds.max)).into_iter().collect()
-        };
+        // The corners of the pages' boxes: those of the box around all would frame it too small.
+        let at = |corner: Vec3| mesh.origin() + corner.as_dvec3();
+        let pages = (0..mesh.num_primitives() as u32).map(|page| mesh.bounds(page));
+        let outline = pages.filter(|b| !b.is_empty());
+        let outline = outline.flat_map(|b| corners_of_box(at(b.min), at(b.max))).collect();
         let scalars = mesh.attributes().scalars;
         let coloring = if let Some(range) = scalars {
             subject.extend_scalar_range(&range);

@@ -93,7 +93,22 @@ struct Rays<'a, Q> {
 impl<Q: HitQuery> Rays<'_, Q> {
     /// The rays `lanes` of the groups `reached` through a page. Returns the groups with nearer
     /// hits.
+    #[inline(always)]
     fn enter<S: Simd>(
+        &mut self,
+        simd: S,
+        number: u32,
+        reached: u16,
+        lanes: impl Fn(usize) -> u16,
+    ) -> u16 {
+        simd.vectorize(
+            #[inline(always)]
+            || self.enter_body(simd, number, reached, lanes),
+        )
+    }
+
+    #[inline(always)]
+    fn enter_body<S: Simd>(
         &mut self,
         simd: S,
         number: u32,

@@ -56,7 +56,9 @@ pub(super) fn bits_for(normals: &[Vec3], tolerance: f64) -> Option<u32> {
         let length = n.length_squared();
         length.is_normal() && (n.x.abs() + n.y.abs() + n.z.abs()).is_normal()
     };
-    if !(tolerance > 0.0) || !normals.iter().all(direction) {
+    // Neither 0 nor NaN is a tolerance.
+    let wanted = tolerance > 0.0;
+    if !wanted || !normals.iter().all(direction) {
         return None;
     }
     let error = |n: Vec3, bits: u32| angle(n, decode(encode(n, bits), bits)).to_degrees();

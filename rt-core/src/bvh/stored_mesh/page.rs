@@ -80,7 +80,7 @@ impl Page {
         let leaf = WithCorners { inner, corners: [Vec3::ZERO; 3] };
         let leaf = dispatch!(level, simd => meshlets::search(simd, &view, &setup, ray.t_max, leaf));
         let best = leaf.inner.best;
-        best.found.then(|| PageHit { first: self.first, id: best.prim, corners: leaf.corners })
+        best.found.then_some(PageHit { first: self.first, id: best.prim, corners: leaf.corners })
     }
 }
 
