@@ -51,7 +51,7 @@ impl<'w> Entry<'w> {
     pub(super) fn pages(self) -> Option<(&'w WideBvh, &'w StoredMesh)> {
         let Entry::Instance { blas, .. } = self else { return None };
         let Content::Shape { bvh, shape } = &blas.content else { return None };
-        Some((bvh, shape.stored_mesh()?))
+        Some((bvh, shape.as_any()?.downcast_ref()?))
     }
 
     /// The number that hits in this entry's tree are stored with until [`Entry::resolve`].

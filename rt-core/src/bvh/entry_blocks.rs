@@ -5,11 +5,12 @@ use super::instance_filter::InstanceFilter;
 use super::layout::wide::{ChildRef, Unit};
 use super::query::{HitQuery, TriangleTest};
 use super::stored_mesh;
-use super::streams::{limits_of, merge_hits};
+use super::streams::merge_hits;
 use super::traverse::single::{RaySetup, traverse_from};
 use super::traverse::tree_view::TreeView;
 use super::world::{InstanceAny, InstanceClosest, World};
 use crate::bvh::traverse::block_entries::BlockEntries;
+use crate::bvh::traverse::block_hits::{limits_of, set_bits};
 use crate::bvh::traverse::incoherent;
 use crate::ray::{HitBlock, LANES, NO_HIT, RayBlock};
 use fearless_simd::Simd;
@@ -71,7 +72,7 @@ impl<S: Simd, T: TriangleTest, Q: HitQuery> BlockEntries<S> for EntryBlocks<'_, 
         simd.vectorize(
             #[inline(always)]
             || {
-                for lane in lanes_of(lanes) {
+                for lane in set_bits(lanes) {
                     let (ray, setup) = (self.rays.get(lane), &setups[lane]);
                     if Q::ANY {
                         let mut leaves = InstanceAny::<T>::new(self.world, &ray, self.filter);
@@ -131,7 +132,7 @@ impl<T: TriangleTest, Q: HitQuery> EntryBlocks<'_, T, Q> {
                 stored_mesh::trace::<S, Q>(simd, pages, mesh, local, found, entry.number());
             }
             _ => {
-                for lane in lanes_of(inside) {
+                for lane in set_bits(inside) {
                     let ray = local.get(lane);
                     if Q::ANY {
                         let hit = entry.occluded::<S, T>(simd, &ray, self.filter);
@@ -151,16 +152,4 @@ impl<T: TriangleTest, Q: HitQuery> EntryBlocks<'_, T, Q> {
             }
         }
     }
-}
-
-/// The numbers of the lanes in a mask.
-#[inline(always)]
-pub(super) fn lanes_of(mut mask: u16) -> impl Iterator<Item = usize> {
-    std::iter::from_fn(move || {
-        (mask != 0).then(|| {
-            let lane = mask.trailing_zeros() as usize & 15;
-            mask &= mask - 1;
-            lane
-        })
-    })
 }

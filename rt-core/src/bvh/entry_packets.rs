@@ -4,8 +4,9 @@ use super::entry::Entry;
 use super::instance_filter::InstanceFilter;
 use super::layout::wide::{ChildRef, Unit};
 use super::query::{HitQuery, TriangleTest};
-use super::streams::{limits_of, merge_hits, trace_tree};
+use super::streams::{merge_hits, trace_tree};
 use super::world::World;
+use crate::bvh::traverse::block_hits::{limits_of, set_bits};
 use crate::bvh::traverse::incoherent;
 use crate::bvh::traverse::packet::{GROUPS, Packet, PacketEntries, RaysLeft};
 use crate::ray::{HitBlock, LANES, RayBlock};
@@ -61,7 +62,7 @@ impl<S: Simd, T: TriangleTest, Q: HitQuery> PacketEntries<S> for EntryPackets<'_
         let world = self.world;
         let Some(entry) = world.entry_of_leaf(units, leaf, self.filter) else { return 0 };
         let changed = self.enter(simd, entry, reached, lanes);
-        for g in groups_of(changed) {
+        for g in set_bits(changed) {
             left.lower::<Q>(g, &self.hits[g]);
         }
         changed
@@ -81,7 +82,7 @@ impl<T: TriangleTest, Q: HitQuery> EntryPackets<'_, T, Q> {
     ) -> u16 {
         let EntryRoom { packet, local, moved, local_hits } = &mut self.room;
         let (mut n, mut entered) = (0, [(0, 0); GROUPS]);
-        for g in groups_of(reached) {
+        for g in set_bits(reached) {
             let limits = limits_of::<Q>(&self.rays[g], &self.hits[g]);
             let (local, moved) = (&mut local[n & 15], &mut moved[n & 15]);
             let inside =
@@ -109,16 +110,4 @@ impl<T: TriangleTest, Q: HitQuery> EntryPackets<'_, T, Q> {
         }
         changed
     }
-}
-
-/// The numbers of the groups in a mask.
-#[inline(always)]
-pub(super) fn groups_of(mut mask: u16) -> impl Iterator<Item = usize> {
-    std::iter::from_fn(move || {
-        (mask != 0).then(|| {
-            let g = mask.trailing_zeros() as usize & 15;
-            mask &= mask - 1;
-            g
-        })
-    })
 }

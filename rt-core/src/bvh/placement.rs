@@ -108,9 +108,9 @@ impl Placement {
         })
     }
 
-    /// Bounds in render space that are close to the boxes of `outline`, in local space, and not only
-    /// to the box around them; all that is held here lies in one of these. The other arguments are
-    /// those of [`Placement::new`].
+    /// Bounds in render space that are close to the boxes of `outline`, in local space, and not
+    /// only to the box around them; all that is held here lies in one of these. The other arguments
+    /// are those of [`Placement::new`].
     pub(super) fn tighten(
         &mut self,
         outline: &[Aabb],
@@ -307,8 +307,8 @@ impl Placement {
     }
 }
 
-/// How far rays may pass by what they hit, in render space: they and their directions are rounded to
-/// f32 in local space, from up to 64 radii away in each axis. The error is at most 2⁻¹⁵ radii.
+/// How far rays may pass by what they hit, in render space: they and their directions are rounded
+/// to f32 in local space, from up to 64 radii away in each axis. The error is at most 2⁻¹⁵ radii.
 fn margin(world_from_object: &DAffine3, frame: &LocalFrame, radius: f64) -> DVec3 {
     let rows = world_from_object.matrix3.transpose();
     let stretch = DVec3::new(rows.x_axis.length(), rows.y_axis.length(), rows.z_axis.length());

@@ -9,6 +9,7 @@ use super::placement::Placement;
 use super::query::{AnyHit, ClosestHit, FastTest, HitQuery, TriangleTest, WatertightTest};
 use super::stored_mesh;
 use super::world::{World, with_ordinary_length};
+use crate::bvh::traverse::block_hits::limits_of;
 use crate::bvh::traverse::incoherent;
 use crate::bvh::traverse::packet::{GROUPS, Packet, PacketLimits};
 use crate::bvh::traverse::tree_view::TreeView;
@@ -420,18 +421,6 @@ fn to_local_space<S: Simd, Q: HitQuery>(
             }
         },
     );
-}
-
-/// The distances up to which rays with these hits have to search.
-#[inline(always)]
-pub(super) fn limits_of<Q: HitQuery>(rays: &RayBlock, hits: &HitBlock) -> [f32; LANES] {
-    std::array::from_fn(|lane| {
-        let found = hits.prim[lane] != NO_HIT;
-        // One ulp past the best: a tie may go to an instance with a lower number. Blocked shadow
-        // rays are finished.
-        let limit = if Q::ANY { -1.0 } else { hits.t[lane].next_up().min(rays.t_max[lane]) };
-        if found { limit } else { rays.t_max[lane] }
-    })
 }
 
 /// Merges the hits of `lanes` in one entry, of rays that were moved by `moved`, into `hits`.

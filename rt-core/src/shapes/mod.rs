@@ -17,10 +17,10 @@ pub use part::ShapePart;
 pub use sphere::Spheres;
 pub use tube::Tubes;
 
-use crate::bvh::StoredMesh;
 use crate::math::Aabb;
 use crate::ray::Ray;
 use glam::{DVec3, Vec3};
+use std::any::Any;
 use std::sync::Arc;
 
 /// A hit that [`Shape::closest`] found on one primitive.
@@ -112,9 +112,10 @@ pub trait Shape: Send + Sync {
         false
     }
 
-    /// The stored mesh that this is, if it is one: its pages take many rays at once.
+    /// The shape itself, where rt-core knows more of its type than this trait says: the pages of a
+    /// stored mesh take many rays at once.
     #[doc(hidden)]
-    fn stored_mesh(&self) -> Option<&StoredMesh> {
+    fn as_any(&self) -> Option<&dyn Any> {
         None
     }
 

@@ -122,8 +122,8 @@ impl ValueTable {
     }
 }
 
-/// The attributes of the triangles `ids` of a mesh with these corners, in a page's form. Normals are
-/// off by at most `tolerance` degrees; as given with a tolerance of 0.
+/// The attributes of the triangles `ids` of a mesh with these corners, in a page's form. Normals
+/// are off by at most `tolerance` degrees; as given with a tolerance of 0.
 pub(super) fn encode(
     mut ids: Vec<u32>,
     corners: impl Fn(u32) -> [u32; 3],

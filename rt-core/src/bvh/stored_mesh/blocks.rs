@@ -5,13 +5,11 @@
 use super::StoredMesh;
 use super::page::Page;
 use crate::bvh::blas::{ShapeAny, ShapeClosest};
-use crate::bvh::entry_blocks::lanes_of;
-use crate::bvh::entry_packets::groups_of;
 use crate::bvh::layout::id_leaf::leaf_primitive_ids;
 use crate::bvh::layout::wide::{ChildRef, Unit, WideBvh};
 use crate::bvh::query::{HitQuery, WatertightTest};
-use crate::bvh::streams::limits_of;
 use crate::bvh::traverse::block_entries::{BlockEntries, traverse_block};
+use crate::bvh::traverse::block_hits::{limits_of, set_bits};
 use crate::bvh::traverse::meshlets;
 use crate::bvh::traverse::packet::{GROUPS, Packet, PacketEntries, PacketLimits, RaysLeft};
 use crate::bvh::traverse::single::{RaySetup, traverse_from};
@@ -117,7 +115,7 @@ impl<Q: HitQuery> Rays<'_, Q> {
     ) -> u16 {
         let InPage { packet, rays: local, hits: found } = &mut *self.inner;
         let (mut n, mut entered) = (0, [0; GROUPS]);
-        for g in groups_of(reached) {
+        for g in set_bits(reached) {
             let limits = limits_of::<Q>(&self.rays[g], &self.hits[g]);
             let (rays, lanes, mut some) = (&mut local[n & 15], lanes(g), false);
             *rays = self.rays[g];
@@ -183,7 +181,7 @@ impl<S: Simd, Q: HitQuery> PacketEntries<S> for Rays<'_, Q> {
         for &page in leaf_primitive_ids(units, leaf) {
             changed |= self.enter(simd, page, reached, |g| lanes[g & 15]);
         }
-        for g in groups_of(changed) {
+        for g in set_bits(changed) {
             left.lower::<Q>(g, &self.hits[g]);
         }
         changed
@@ -230,7 +228,7 @@ impl<S: Simd, Q: HitQuery> BlockEntries<S> for Rays<'_, Q> {
         simd.vectorize(
             #[inline(always)]
             || {
-                for lane in lanes_of(lanes) {
+                for lane in set_bits(lanes) {
                     let (shape, ray) = (self.mesh, self.rays[0].get(lane));
                     let (setup, hits) = (&setups[lane], &mut self.hits[0]);
                     if Q::ANY {

@@ -1,5 +1,6 @@
 //! Unit normals in a few bits: the octahedron unfolded to a square (Meyer et al. 2010; measured by
-//! Cigolle et al., "A Survey of Efficient Representations for Independent Unit Vectors", JCGT 2014).
+//! Cigolle et al., "A Survey of Efficient Representations for Independent Unit Vectors", JCGT
+//! 2014).
 
 use glam::{DVec3, Vec3};
 
@@ -49,8 +50,8 @@ fn angle(a: Vec3, b: Vec3) -> f64 {
     a.cross(b).length().atan2(a.dot(b))
 }
 
-/// The fewest bits with which no normal is off by more than `tolerance` degrees. `None` when sixteen
-/// do not suffice, or one of them is no direction.
+/// The fewest bits with which no normal is off by more than `tolerance` degrees. `None` when
+/// sixteen do not suffice, or one of them is no direction.
 pub(super) fn bits_for(normals: &[Vec3], tolerance: f64) -> Option<u32> {
     let direction = |n: &Vec3| {
         let length = n.length_squared();

@@ -16,6 +16,7 @@ use crate::ray::Ray;
 use crate::shapes::{Shape, ShapeHit, ShapeSurface, rounded_point};
 use fearless_simd::Level;
 use glam::DVec3;
+use std::any::Any;
 use std::sync::OnceLock;
 
 /// A mesh in bytes elsewhere, as a shape: its primitives are pages. [`super::StoredMeshWriter`]
@@ -278,7 +279,7 @@ impl Shape for StoredMesh {
         self.header.attributes.transparent
     }
 
-    fn stored_mesh(&self) -> Option<&StoredMesh> {
+    fn as_any(&self) -> Option<&dyn Any> {
         Some(self)
     }
 

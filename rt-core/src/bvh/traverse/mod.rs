@@ -2,6 +2,7 @@
 
 pub(crate) mod block_boxes;
 pub(crate) mod block_entries;
+pub(crate) mod block_hits;
 mod child_order;
 mod hybrid;
 pub(crate) mod incoherent;
