@@ -310,7 +310,7 @@ fn a_stored_mesh_has_the_picture_of_the_mesh_in_memory() {
 }
 
 #[test]
-fn pieces_of_stl_and_of_parallel_files_are_stored_one_after_the_other() {
+fn pieces_of_stl_ply_and_parallel_files_are_stored_one_after_the_other() {
     let dir = tempfile::tempdir().unwrap();
     let of = |name: &str| dir.path().join(name).display().to_string();
     let (mesh, stored) = (ball(), of("ball.rtmesh"));
@@ -335,6 +335,11 @@ fn pieces_of_stl_and_of_parallel_files_are_stored_one_after_the_other() {
     let refused = bench(&["store", &of("cut.stl"), "-o", &stored]);
     let text = String::from_utf8_lossy(&refused.stderr).into_owned();
     assert!(refused.status.code() == Some(1) && text.contains("cut.stl"), "{text}");
+
+    files(dir.path());
+    let said = store(&of("ball.ply"));
+    assert_eq!(said["triangles"], 1280);
+    assert!(said["attribute_bytes"].as_u64().unwrap() > 0, "{said}");
 
     // Two halves, the second far from the first.
     let mut far = mesh.clone();

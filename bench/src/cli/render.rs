@@ -36,8 +36,12 @@ pub(super) fn render(common: CommonArgs, args: &RenderArgs) -> anyhow::Result<()
 
     let start = Instant::now();
     common.note(1, format_args!("reading {file}"));
-    let load_options =
-        LoadOptions { color_by: args.color_by.clone(), isovalue: args.isovalue, volume };
+    let load_options = LoadOptions {
+        color_by: args.color_by.clone(),
+        isovalue: args.isovalue,
+        volume,
+        origin: None,
+    };
     let stored = stored_mesh::open(args, &load_options)?;
     let cure = if load_options.volume == VolumeChoice::No {
         "look at the file with the options --color-by and --isovalue in mind, or convert it to \

@@ -8,6 +8,8 @@ use datasets::cli::{Cancel, CommonArgs, CureExt as _, UsageError};
 use datasets::generate::nested_wavelet::{POINTS, isovalues_for};
 use datasets::generate::wavelet::Wavelet;
 use datasets::isosurface::{self, Options};
+use datasets::read::LoadedFile;
+use datasets::read::ply_pieces::PlyPieces;
 use datasets::read::stl_pieces::StlPieces;
 use datasets::read::vtk_xml::{PieceFiles, piece_files};
 use datasets::stored_mesh::{self, StoredMeshFile};
@@ -82,6 +84,19 @@ fn store_file(
     {
         return store_stl(common, args, pieces, memory, cancel);
     }
+    if named("ply")
+        && let Some(pieces) = PlyPieces::open(file, PIECE)?
+    {
+        let bar = common.progress(pieces.faces(), "storing");
+        let mut stored = None;
+        for piece in pieces {
+            let meshes = triangles_of(common, args, file, &piece?, origin_of(&stored))?;
+            let faces: usize = meshes.iter().map(|mesh| mesh.num_triangles()).sum();
+            add_all(common, args, meshes, &mut stored, memory, cancel)?;
+            bar.inc(faces as u64);
+        }
+        return finish(file, stored);
+    }
     // The surface of a volume's pieces would have the faces between them.
     if named("pvtp")
         && let Some(PieceFiles { files, .. }) = piece_files(file)?
@@ -89,20 +104,25 @@ fn store_file(
         let mut stored = None;
         for (number, piece) in files.iter().enumerate() {
             common.note(1, format_args!("piece {} of {}", number + 1, files.len()));
-            let meshes = triangles_of(common, args, piece)?;
-            if !meshes.is_empty() {
-                add_all(common, args, meshes, &mut stored, memory, cancel)?;
-            }
+            let opened = datasets::read::open(piece)?;
+            let meshes = triangles_of(common, args, piece, &opened, origin_of(&stored))?;
+            add_all(common, args, meshes, &mut stored, memory, cancel)?;
         }
         return finish(file, stored);
     }
-    let (mut stored, meshes) = (None, triangles_of(common, args, file)?);
+    let meshes = triangles_of(common, args, file, &datasets::read::open(file)?, None)?;
+    let mut stored = None;
     add_all(common, args, meshes, &mut stored, memory, cancel)?;
     finish(file, stored)
 }
 
 /// A file that is being written, and the origin of its positions.
 type Stored = (StoredMeshWriter<StoredMeshFile>, DVec3);
+
+/// The origin of the pieces before, which the next one shares.
+fn origin_of(stored: &Option<Stored>) -> Option<DVec3> {
+    stored.as_ref().map(|(_, origin)| *origin)
+}
 
 fn finish(file: &Path, stored: Option<Stored>) -> anyhow::Result<StoredMeshReport> {
     let Some((writer, _)) = stored else {
@@ -132,22 +152,23 @@ fn store_stl(
     Ok(stored_mesh::finish(writer)?)
 }
 
-/// The meshes of a file that is read whole.
+/// The meshes of a file, or of a piece of it.
 fn triangles_of(
     common: CommonArgs,
     args: &StoreArgs,
     file: &Path,
+    opened: &LoadedFile,
+    origin: Option<DVec3>,
 ) -> anyhow::Result<Vec<Arc<TriMesh>>> {
     let shown = file.display();
-    let opened = datasets::read::open(file)?;
     let options = LoadOptions {
         isovalue: args.isovalue,
         color_by: args.color_by.clone(),
+        origin,
         ..LoadOptions::default()
     };
-    let subject = Subject::from_file(&opened, &options)
+    let subject = Subject::from_file(opened, &options)
         .with_context(|| format!("{shown}: no triangles to store"))?;
-    drop(opened);
     for warning in &subject.warnings {
         common.warn(format_args!("{shown}: {warning}"));
     }
@@ -200,11 +221,9 @@ fn add_all(
     if moved > 0 {
         common.note(0, format_args!("{moved} meshes moved to the origin of the first"));
     }
-    let bar = common.progress(meshes.len() as u64, "storing");
-    for (number, mesh) in meshes.into_iter().enumerate() {
+    for mesh in meshes {
         cancel.check()?;
         add(writer, args, &mesh)?;
-        bar.set_position(number as u64 + 1);
     }
     Ok(())
 }

@@ -86,6 +86,9 @@ pub struct LoadOptions {
     pub isovalue: Option<f32>,
     /// Whether image data is drawn as a volume.
     pub volume: VolumeChoice,
+    /// What positions of surfaces of data sets are relative to; `None` to choose it. For pieces of
+    /// one surface.
+    pub origin: Option<DVec3>,
 }
 
 /// Selects the field for volume rendering.
@@ -256,7 +259,7 @@ fn from_data(data: &Dataset, load_options: &LoadOptions) -> anyhow::Result<Subje
     if let Some(grid) = lattice(data, &color, &mut subject)? {
         return isosurface(subject, data, grid, load_options);
     }
-    let (mesh, report) = data.to_trimesh(color.as_deref())?;
+    let (mesh, report) = data.to_trimesh_at(color.as_deref(), load_options.origin)?;
     subject.warnings.extend(report.warnings());
     if mesh.num_triangles() > 0 {
         subject.add_mesh(mesh, DEFAULT_COLOR);

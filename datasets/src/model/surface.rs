@@ -68,6 +68,17 @@ impl Dataset {
         &self,
         color_by: Option<&str>,
     ) -> Result<(TriMesh, SurfaceReport), ModelError> {
+        self.to_trimesh_at(color_by, None)
+    }
+
+    /// [`Dataset::to_trimesh`] with positions relative to `origin`; without it, to one that is
+    /// chosen for them. Pieces of one surface want one origin: relative to several, a point on
+    /// their border would be rounded in several ways, and rays could pass between them.
+    pub fn to_trimesh_at(
+        &self,
+        color_by: Option<&str>,
+        origin: Option<DVec3>,
+    ) -> Result<(TriMesh, SurfaceReport), ModelError> {
         self.check()?;
         let color = color_by.map(|name| ColorBy::find(self, name)).transpose()?;
         let mut out = Builder::new(color);
@@ -106,7 +117,7 @@ impl Dataset {
                 Dataset::MultiBlock(_) => unreachable!("leaves() returns no collections"),
             }
         }
-        out.finish()
+        out.finish(origin)
     }
 }
 
@@ -459,10 +470,16 @@ impl Builder {
         }
     }
 
-    fn finish(mut self) -> Result<(TriMesh, SurfaceReport), ModelError> {
+    fn finish(mut self, origin: Option<DVec3>) -> Result<(TriMesh, SurfaceReport), ModelError> {
         let vertices = self.positions.len();
         self.report.triangles = self.indices.len();
-        let mut mesh = TriMesh::from_f64_positions(&self.positions, self.indices);
+        let mut mesh = match origin {
+            None => TriMesh::from_f64_positions(&self.positions, self.indices),
+            Some(origin) => {
+                let positions = self.positions.iter().map(|p| (*p - origin).as_vec3()).collect();
+                TriMesh { origin, ..TriMesh::new(positions, self.indices) }
+            }
+        };
         if self.any_normals {
             self.normals.resize(vertices, Vec3::ZERO);
             mesh.normals = Some(Attribute::per_vertex(self.normals));

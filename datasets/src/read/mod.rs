@@ -27,6 +27,7 @@ mod options;
 pub(crate) mod percent;
 pub mod plot3d;
 pub mod ply;
+pub mod ply_pieces;
 pub mod raw;
 pub mod scene;
 pub mod stl;

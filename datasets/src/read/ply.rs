@@ -28,27 +28,29 @@ pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadErro
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Encoding {
+pub(super) enum Encoding {
     Text,
     Binary(Endian),
 }
 
-struct Property {
-    name: String,
-    kind: ScalarType,
+#[derive(Debug, Clone)]
+pub(super) struct Property {
+    pub(super) name: String,
+    pub(super) kind: ScalarType,
     /// For lists: the type of the length.
-    list: Option<ScalarType>,
+    pub(super) list: Option<ScalarType>,
 }
 
-struct Element {
-    name: String,
-    count: u64,
-    properties: Vec<Property>,
+#[derive(Debug, Clone)]
+pub(super) struct Element {
+    pub(super) name: String,
+    pub(super) count: u64,
+    pub(super) properties: Vec<Property>,
 }
 
 /// The columns of an element. A column holds one value per row; for lists, it holds all entries and
 /// the end of each row.
-struct Columns {
+pub(super) struct Columns {
     plain: Vec<Values>,
     lists: Vec<(Values, Vec<usize>)>,
 }
@@ -82,7 +84,7 @@ fn parse(bytes: &[u8], warnings: &mut Vec<String>) -> Result<PolyData, Fault> {
     Ok(out)
 }
 
-fn header(cursor: &mut Cursor<'_>) -> Result<(Encoding, Vec<Element>), Fault> {
+pub(super) fn header(cursor: &mut Cursor<'_>) -> Result<(Encoding, Vec<Element>), Fault> {
     let mut number = 0;
     let mut encoding = None;
     let mut elements: Vec<Element> = Vec::new();
@@ -151,7 +153,11 @@ fn header(cursor: &mut Cursor<'_>) -> Result<(Encoding, Vec<Element>), Fault> {
 }
 
 /// Reads all rows of an element.
-fn rows(cursor: &mut Cursor<'_>, element: &Element, encoding: Encoding) -> Result<Columns, Fault> {
+pub(super) fn rows(
+    cursor: &mut Cursor<'_>,
+    element: &Element,
+    encoding: Encoding,
+) -> Result<Columns, Fault> {
     // The minimum size of a row: in binary its numbers, in text a digit and a separator each.
     let least: usize = element
         .properties
@@ -232,7 +238,11 @@ fn rows(cursor: &mut Cursor<'_>, element: &Element, encoding: Encoding) -> Resul
     Ok(columns)
 }
 
-fn vertices(element: &Element, columns: Columns, out: &mut PolyData) -> Result<(), Fault> {
+pub(super) fn vertices(
+    element: &Element,
+    columns: Columns,
+    out: &mut PolyData,
+) -> Result<(), Fault> {
     let names: Vec<&str> =
         element.properties.iter().filter(|p| p.list.is_none()).map(|p| p.name.as_str()).collect();
     let column = |name: &str| names.iter().position(|n| *n == name);
@@ -287,7 +297,7 @@ fn vertices(element: &Element, columns: Columns, out: &mut PolyData) -> Result<(
     Ok(())
 }
 
-fn faces(
+pub(super) fn faces(
     element: &Element,
     columns: Columns,
     out: &mut PolyData,
@@ -295,9 +305,8 @@ fn faces(
 ) -> Result<(), Fault> {
     let lists: Vec<&Property> = element.properties.iter().filter(|p| p.list.is_some()).collect();
     let plain: Vec<&Property> = element.properties.iter().filter(|p| p.list.is_none()).collect();
-    let wanted = ["vertex_indices", "vertex_index"];
     for (p, (values, ends)) in lists.iter().zip(columns.lists) {
-        if !wanted.contains(&p.name.as_str()) {
+        if !is_corners(&p.name) {
             warnings.push(format!("list `{}` of `{}` left out", p.name, element.name));
             continue;
         }
@@ -323,6 +332,11 @@ fn faces(
         }
     }
     Ok(())
+}
+
+/// Whether a list of this name has the vertices of faces.
+pub(super) fn is_corners(name: &str) -> bool {
+    ["vertex_indices", "vertex_index"].contains(&name)
 }
 
 fn scalar_type(name: &str) -> Option<ScalarType> {
