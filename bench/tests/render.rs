@@ -330,6 +330,9 @@ fn pieces_of_stl_ply_and_parallel_files_are_stored_one_after_the_other() {
     std::fs::write(of("ball.stl"), &stl).unwrap();
     let said = store(&of("ball.stl"));
     assert_eq!((&said["triangles"], &said["attribute_bytes"]), (&1280.into(), &0.into()));
+    let said = bench(&["store", &of("ball.stl"), "-o", &stored, "--normal-tolerance", "1"]);
+    let text = String::from_utf8_lossy(&said.stderr).into_owned();
+    assert!(text.contains("--normal-tolerance has no effect"), "{text}");
     // Cut, it is no binary file any more, and the reader of whole files says what is wrong.
     std::fs::write(of("cut.stl"), &stl[..5000]).unwrap();
     let refused = bench(&["store", &of("cut.stl"), "-o", &stored]);
@@ -348,9 +351,14 @@ fn pieces_of_stl_ply_and_parallel_files_are_stored_one_after_the_other() {
         let poly = Dataset::PolyData(PolyData::from_trimesh(mesh));
         write_vtk(dir.path().join(name), &poly, VtkOptions::default()).unwrap();
     }
-    let list = r#"<VTKFile type="PPolyData"><PPolyData>
+    // A process without triangles writes an empty piece, here without the arrays of the others.
+    let none = Dataset::PolyData(PolyData::default());
+    write_vtk(dir.path().join("none.vtp"), &none, VtkOptions::default()).unwrap();
+    let list = r#"<VTKFile type="PPolyData"><PPolyData><Piece Source="none.vtp"/>
         <Piece Source="a.vtp"/><Piece Source="b.vtp"/></PPolyData></VTKFile>"#;
     std::fs::write(of("both.pvtp"), list).unwrap();
+    let made = bench(&["store", &of("both.pvtp"), "-o", &stored, "--color-by", "scalars"]);
+    assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
     let said = store(&of("both.pvtp"));
     assert_eq!(said["triangles"], 2560);
     assert!(said["attribute_bytes"].as_u64().unwrap() > 0, "{said}");

@@ -8,17 +8,17 @@ use datasets::cli::{Cancel, CommonArgs, CureExt as _, UsageError};
 use datasets::generate::nested_wavelet::{POINTS, isovalues_for};
 use datasets::generate::wavelet::Wavelet;
 use datasets::isosurface::{self, Options};
-use datasets::read::LoadedFile;
 use datasets::read::ply_pieces::PlyPieces;
 use datasets::read::stl_pieces::StlPieces;
 use datasets::read::vtk_xml::{PieceFiles, piece_files};
+use datasets::read::{Content, LoadedFile};
 use datasets::stored_mesh::{self, StoredMeshFile};
-use rt_core::bvh::{Geometry, StoredMeshError, StoredMeshReport, StoredMeshWriter};
+use rt_core::bvh::{Geometry, StoredMeshReport, StoredMeshWriter};
 use rt_core::glam::DVec3;
 use rt_core::mesh::{MeshSlices, TriMesh};
 use serde_json::json;
+use std::collections::HashSet;
 use std::path::Path;
-use std::sync::Arc;
 use std::time::Instant;
 
 pub(super) const EXAMPLES: &str = "\
@@ -65,7 +65,7 @@ pub(super) fn store(common: CommonArgs, args: &StoreArgs) -> anyhow::Result<()> 
     })
 }
 
-/// Triangles of a file that is read in pieces.
+/// Triangles, or faces, of a file that is read in pieces.
 const PIECE: usize = 1 << 20;
 
 /// The triangles of a file: in pieces where its format allows it, else mesh by mesh.
@@ -78,154 +78,167 @@ fn store_file(
 ) -> anyhow::Result<StoredMeshReport> {
     let named =
         |extension: &str| file.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension));
+    let mut storing = Storing::new(common, args, memory, cancel);
     if named("stl")
         && args.color_by.is_none()
         && let Some(pieces) = StlPieces::open(file, PIECE)?
     {
-        return store_stl(common, args, pieces, memory, cancel);
-    }
-    if named("ply")
-        && let Some(pieces) = PlyPieces::open(file, PIECE)?
-    {
-        let bar = common.progress(pieces.faces(), "storing");
-        let mut stored = None;
+        let bar = common.progress(pieces.triangles(), "storing");
         for piece in pieces {
-            let meshes = triangles_of(common, args, file, &piece?, origin_of(&stored))?;
-            let faces: usize = meshes.iter().map(|mesh| mesh.num_triangles()).sum();
-            add_all(common, args, meshes, &mut stored, memory, cancel)?;
-            bar.inc(faces as u64);
+            let mesh = piece?;
+            storing.add(&mesh)?;
+            bar.inc(mesh.num_triangles() as u64);
         }
-        return finish(file, stored);
-    }
-    // The surface of a volume's pieces would have the faces between them.
-    if named("pvtp")
+    } else if named("ply")
+        && let Some(mut pieces) = PlyPieces::open(file, PIECE)?
+    {
+        let (bar, origin) = (common.progress(pieces.faces(), "storing"), pieces.origin());
+        while let Some(piece) = pieces.next() {
+            storing.add_file(file, &piece?, Some(origin))?;
+            bar.set_position(pieces.faces_read());
+        }
+    } else if named("pvtp")
         && let Some(PieceFiles { files, .. }) = piece_files(file)?
     {
-        let mut stored = None;
-        for (number, piece) in files.iter().enumerate() {
-            common.note(1, format_args!("piece {} of {}", number + 1, files.len()));
+        // Not of `.pvtu`: the surface of a volume's pieces would have the faces between them.
+        let bar = common.progress(files.len() as u64, "storing");
+        for piece in &files {
             let opened = datasets::read::open(piece)?;
-            let meshes = triangles_of(common, args, piece, &opened, origin_of(&stored))?;
-            add_all(common, args, meshes, &mut stored, memory, cancel)?;
+            // A process without a part of the surface writes a piece without points, and often
+            // without the arrays of the others.
+            if !is_empty(&opened) {
+                storing.add_file(piece, &opened, storing.origin())?;
+            }
+            bar.inc(1);
         }
-        return finish(file, stored);
+    } else {
+        storing.add_file(file, &datasets::read::open(file)?, None)?;
     }
-    let meshes = triangles_of(common, args, file, &datasets::read::open(file)?, None)?;
-    let mut stored = None;
-    add_all(common, args, meshes, &mut stored, memory, cancel)?;
-    finish(file, stored)
+    storing.finish(file)
 }
 
-/// A file that is being written, and the origin of its positions.
-type Stored = (StoredMeshWriter<StoredMeshFile>, DVec3);
-
-/// The origin of the pieces before, which the next one shares.
-fn origin_of(stored: &Option<Stored>) -> Option<DVec3> {
-    stored.as_ref().map(|(_, origin)| *origin)
+/// Whether a file has no points.
+fn is_empty(opened: &LoadedFile) -> bool {
+    match &opened.content {
+        Content::Data(data) => data.leaves().iter().all(|leaf| leaf.counts().0 == 0),
+        Content::Scene(_) => false,
+    }
 }
 
-fn finish(file: &Path, stored: Option<Stored>) -> anyhow::Result<StoredMeshReport> {
-    let Some((writer, _)) = stored else {
-        let shown = file.display();
-        let text = format!("{shown} has no triangles; `bench render {shown}` shows what it has");
-        return Err(UsageError(text).into());
-    };
-    Ok(stored_mesh::finish(writer)?)
-}
-
-fn store_stl(
+/// A file that is being written.
+struct Storing<'a> {
     common: CommonArgs,
-    args: &StoreArgs,
-    pieces: StlPieces,
+    args: &'a StoreArgs,
     memory: usize,
-    cancel: &Cancel,
-) -> anyhow::Result<StoredMeshReport> {
-    let mut writer = stored_mesh::create(&args.out, DVec3::ZERO)?;
-    writer.set_memory(memory);
-    let bar = common.progress(pieces.triangles(), "storing");
-    for piece in pieces {
-        cancel.check()?;
-        let piece = piece?;
-        writer.add(&MeshSlices::of_mesh(&piece))?;
-        bar.inc(piece.num_triangles() as u64);
-    }
-    Ok(stored_mesh::finish(writer)?)
+    cancel: &'a Cancel,
+    /// Started by the first mesh, whose origin all positions are relative to.
+    writer: Option<(StoredMeshWriter<StoredMeshFile>, DVec3)>,
+    /// What the user was told: pieces of a file are wanting in the same ways.
+    warned: HashSet<String>,
+    has_normals: bool,
 }
 
-/// The meshes of a file, or of a piece of it.
-fn triangles_of(
-    common: CommonArgs,
-    args: &StoreArgs,
-    file: &Path,
-    opened: &LoadedFile,
-    origin: Option<DVec3>,
-) -> anyhow::Result<Vec<Arc<TriMesh>>> {
-    let shown = file.display();
-    let options = LoadOptions {
-        isovalue: args.isovalue,
-        color_by: args.color_by.clone(),
-        origin,
-        ..LoadOptions::default()
-    };
-    let subject = Subject::from_file(opened, &options)
-        .with_context(|| format!("{shown}: no triangles to store"))?;
-    for warning in &subject.warnings {
-        common.warn(format_args!("{shown}: {warning}"));
+impl<'a> Storing<'a> {
+    fn new(common: CommonArgs, args: &'a StoreArgs, memory: usize, cancel: &'a Cancel) -> Self {
+        let (writer, warned, has_normals) = (None, HashSet::new(), false);
+        Storing { common, args, memory, cancel, writer, warned, has_normals }
     }
-    let all = subject.parts.len();
-    let with_materials = subject
-        .parts
-        .iter()
-        .any(|p| matches!(p.coloring, PartColoring::FileMaterial(_) | PartColoring::Glass(_)));
-    if with_materials && !args.no_attributes {
-        common.warn(format_args!("{shown}: materials are not stored, but colours of vertices are"));
-    }
-    let meshes: Vec<_> = subject
-        .parts
-        .into_iter()
-        .filter_map(|part| match part.geometry {
-            Geometry::Mesh(mesh) => Some(mesh),
-            Geometry::Shape(_) | Geometry::Slices(_) => None,
-        })
-        .collect();
-    if meshes.len() < all {
-        let left_out = all - meshes.len();
-        common.warn(format_args!("{shown}: {left_out} parts that are not triangles are left out"));
-    }
-    if meshes.iter().any(|mesh| mesh.texcoords.is_some()) && !args.no_attributes {
-        common.warn(format_args!("{shown}: texture coordinates are not stored"));
-    }
-    Ok(meshes)
-}
 
-/// Adds meshes to the file, which the first of them starts.
-fn add_all(
-    common: CommonArgs,
-    args: &StoreArgs,
-    meshes: Vec<Arc<TriMesh>>,
-    stored: &mut Option<Stored>,
-    memory: usize,
-    cancel: &Cancel,
-) -> anyhow::Result<()> {
-    let Some(first) = meshes.first() else { return Ok(()) };
-    let (writer, origin) = match stored {
-        Some(stored) => stored,
-        None => {
-            let mut writer = stored_mesh::create(&args.out, first.origin)?;
-            writer.set_memory(memory);
-            writer.set_normal_tolerance(args.normal_tolerance);
-            stored.insert((writer, first.origin))
+    fn origin(&self) -> Option<DVec3> {
+        self.writer.as_ref().map(|(_, origin)| *origin)
+    }
+
+    fn warn_once(&mut self, text: String) {
+        if !self.warned.contains(&text) {
+            let file = self.args.file.as_ref().unwrap_or(&self.args.out);
+            self.common.warn(format_args!("{}: {text}", file.display()));
+            self.warned.insert(text);
         }
-    };
-    let (meshes, moved) = with_origin(meshes, *origin);
-    if moved > 0 {
-        common.note(0, format_args!("{moved} meshes moved to the origin of the first"));
     }
-    for mesh in meshes {
-        cancel.check()?;
-        add(writer, args, &mesh)?;
+
+    /// Adds the meshes of a file, or of a piece of it.
+    fn add_file(
+        &mut self,
+        file: &Path,
+        opened: &LoadedFile,
+        origin: Option<DVec3>,
+    ) -> anyhow::Result<()> {
+        let options = LoadOptions {
+            isovalue: self.args.isovalue,
+            color_by: self.args.color_by.clone(),
+            origin,
+            ..LoadOptions::default()
+        };
+        let subject = Subject::from_file(opened, &options)
+            .with_context(|| format!("{}: no triangles to store", file.display()))?;
+        for warning in subject.warnings {
+            self.warn_once(warning);
+        }
+        let all = subject.parts.len();
+        let with_materials = subject
+            .parts
+            .iter()
+            .any(|p| matches!(p.coloring, PartColoring::FileMaterial(_) | PartColoring::Glass(_)));
+        if with_materials && !self.args.no_attributes {
+            self.warn_once("materials are not stored, but colours of vertices are".into());
+        }
+        let meshes: Vec<_> = subject
+            .parts
+            .into_iter()
+            .filter_map(|part| match part.geometry {
+                Geometry::Mesh(mesh) => Some(mesh),
+                Geometry::Shape(_) | Geometry::Slices(_) => None,
+            })
+            .collect();
+        if meshes.len() < all {
+            let left_out = all - meshes.len();
+            self.warn_once(format!("{left_out} parts that are not triangles are left out"));
+        }
+        if meshes.iter().any(|mesh| mesh.texcoords.is_some()) && !self.args.no_attributes {
+            self.warn_once("texture coordinates are not stored".into());
+        }
+        let Some(first) = meshes.first() else { return Ok(()) };
+        let origin = self.origin().unwrap_or(first.origin);
+        let (meshes, moved) = with_origin(meshes, origin);
+        if moved > 0 {
+            self.common.note(0, format_args!("{moved} meshes moved to the origin of the first"));
+        }
+        meshes.iter().try_for_each(|mesh| self.add(mesh))
     }
-    Ok(())
+
+    /// Adds a mesh, with its attributes unless the user wants none.
+    fn add(&mut self, mesh: &TriMesh) -> anyhow::Result<()> {
+        self.cancel.check()?;
+        let writer = match &mut self.writer {
+            Some((writer, _)) => writer,
+            None => {
+                let mut writer = stored_mesh::create(&self.args.out, mesh.origin)?;
+                writer.set_memory(self.memory);
+                writer.set_normal_tolerance(self.args.normal_tolerance);
+                &mut self.writer.insert((writer, mesh.origin)).0
+            }
+        };
+        self.has_normals |= mesh.normals.is_some();
+        if self.args.no_attributes {
+            writer.add(&MeshSlices::of_mesh(mesh))?;
+        } else {
+            writer.add_mesh(mesh)?;
+        }
+        Ok(())
+    }
+
+    fn finish(mut self, file: &Path) -> anyhow::Result<StoredMeshReport> {
+        if self.args.normal_tolerance > 0.0 && !self.has_normals {
+            self.warn_once("--normal-tolerance has no effect: there are no normals".into());
+        }
+        let Some((writer, _)) = self.writer else {
+            let shown = file.display();
+            let text =
+                format!("{shown} has no triangles; `bench render {shown}` shows what it has");
+            return Err(UsageError(text).into());
+        };
+        Ok(stored_mesh::finish(writer)?)
+    }
 }
 
 /// Nested isosurfaces of the wavelet, one after the other: the dissertation's scaling series
@@ -239,26 +252,14 @@ fn store_wavelet(
 ) -> anyhow::Result<StoredMeshReport> {
     let grid = Wavelet::with_points(POINTS).grid()?;
     let isovalues = isovalues_for(&grid, millions as usize * 1_000_000)?;
-    let mut writer = stored_mesh::create(&args.out, DVec3::ZERO)?;
-    writer.set_memory(memory);
-    writer.set_normal_tolerance(args.normal_tolerance);
     let options = Options { normals: !args.no_attributes, ..Options::default() };
+    let mut storing = Storing::new(common, args, memory, cancel);
     let bar = common.progress(isovalues.len() as u64, "storing");
     for (number, isovalue) in isovalues.iter().enumerate() {
-        cancel.check()?;
         let surface = isosurface::extract(&grid, &[*isovalue], options)
             .cure("give --wavelet fewer millions")?;
-        add(&mut writer, args, &surface.mesh)?;
+        storing.add(&surface.mesh)?;
         bar.set_position(number as u64 + 1);
     }
-    Ok(stored_mesh::finish(writer)?)
-}
-
-/// Adds a mesh, with its attributes unless the user wants none.
-fn add(
-    writer: &mut StoredMeshWriter<StoredMeshFile>,
-    args: &StoreArgs,
-    mesh: &TriMesh,
-) -> Result<(), StoredMeshError> {
-    if args.no_attributes { writer.add(&MeshSlices::of_mesh(mesh)) } else { writer.add_mesh(mesh) }
+    storing.finish(&args.out)
 }

@@ -8,6 +8,8 @@ use super::error::{At, BROKEN, Cursor, Fault, TRUNCATED, io_error};
 use super::ply::{Element, Encoding, FORMAT, Property, faces, header, is_corners, rows, vertices};
 use super::{Content, LoadedFile, ReadError};
 use crate::model::{Cells, DataArray, Dataset, Endian, Points, PolyData, Values};
+use glam::DVec3;
+use rt_core::mesh::TriMesh;
 use std::collections::HashMap;
 use std::fs::File;
 use std::io::{BufReader, Read as _, Seek as _, SeekFrom};
@@ -101,6 +103,22 @@ impl PlyPieces {
     /// Faces of the file.
     pub fn faces(&self) -> u64 {
         self.element.count
+    }
+
+    /// Faces read so far.
+    pub fn faces_read(&self) -> u64 {
+        self.read
+    }
+
+    /// What the positions of all pieces want to be relative to
+    /// ([`crate::model::Dataset::to_trimesh_at`]): the origin that [`TriMesh::from_f64_positions`]
+    /// chooses for the whole.
+    pub fn origin(&self) -> DVec3 {
+        let points = &self.vertices.points;
+        let all = (0..points.len()).map(|i| points.get(i)).filter(|p| p.is_finite());
+        let empty = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        let (low, high) = all.fold(empty, |(low, high), p| (low.min(p), high.max(p)));
+        TriMesh::from_f64_positions(&[low, high], Vec::new()).origin
     }
 
     fn next_piece(&mut self, count: u64) -> Result<LoadedFile, ReadError> {
@@ -243,8 +261,9 @@ mod tests {
     use super::*;
     use crate::generate::shapes::icosphere;
     use crate::write::write_ply;
+    use glam::Vec3;
     use rt_core::math::SplitMix64;
-    use rt_core::mesh::{Attribute, TriMesh};
+    use rt_core::mesh::Attribute;
 
     /// A ball with normals, colours and scalars.
     fn ball() -> TriMesh {
@@ -257,7 +276,7 @@ mod tests {
     fn triangles(file: &LoadedFile) -> TriMesh {
         let Content::Data(data) = &file.content else { panic!("no data") };
         let marked = data.attributes().and_then(|a| a.point_scalars.clone());
-        data.to_trimesh_at(marked.as_deref(), Some(glam::DVec3::ZERO)).unwrap().0
+        data.to_trimesh_at(marked.as_deref(), Some(DVec3::ZERO)).unwrap().0
     }
 
     fn pieces(path: &Path, size: usize) -> Vec<Result<LoadedFile, ReadError>> {
@@ -321,6 +340,31 @@ mod tests {
             (0..mesh.num_triangles()).map(|i| mesh.triangle(i)).collect::<Vec<_>>()
         };
         assert_eq!(parts.iter().flat_map(&of).collect::<Vec<_>>(), of(&whole));
+    }
+
+    #[test]
+    fn far_from_zero_pieces_have_the_positions_of_the_whole_bit_for_bit() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("far.ply");
+        let mut mesh = icosphere(2);
+        mesh.positions.iter_mut().for_each(|p| *p += Vec3::new(4321.1, -765.4, 0.1));
+        write_ply(&path, &mesh).unwrap();
+        let Content::Data(whole) = super::super::ply::read(&path).unwrap().content else {
+            panic!("no data")
+        };
+        let whole = whole.to_trimesh(None).unwrap().0;
+        let parts = PlyPieces::open(&path, 50).unwrap().expect("binary");
+        let origin = parts.origin();
+        assert!(origin == whole.origin && origin != DVec3::ZERO, "{origin}");
+        let part = |p: Result<LoadedFile, ReadError>| {
+            let Content::Data(data) = p.unwrap().content else { panic!("no data") };
+            data.to_trimesh_at(None, Some(origin)).unwrap().0
+        };
+        let of = |mesh: &TriMesh| -> Vec<[Vec3; 3]> {
+            (0..mesh.num_triangles()).map(|i| mesh.triangle(i)).collect()
+        };
+        let parts: Vec<TriMesh> = parts.map(part).collect();
+        assert!(parts.len() > 3 && parts.iter().flat_map(&of).collect::<Vec<_>>() == of(&whole));
     }
 
     #[test]

@@ -8,7 +8,7 @@
 
 use super::entry::Entry;
 use super::instance_filter::InstanceFilter;
-use super::layout::wide::{ChildRef, MAX_DEPTH};
+use super::layout::wide::{CHILD_ROW, ChildRef, MAX_DEPTH};
 use super::query::{HitQuery, TriangleTest};
 use super::world::World;
 use crate::bvh::traverse::block_boxes::BlockSetup;
@@ -161,7 +161,7 @@ impl<'w, 'r, T: TriangleTest, Q: HitQuery> Lane<'w, 'r, T, Q> {
     fn test_leaves<S: Simd>(&mut self, simd: S) {
         count(Counter::Leaves, self.leaves.count_ones() as u64);
         let units = self.tree.units;
-        let refs = units[self.parent + crate::bvh::layout::wide::CHILD_ROW].bits();
+        let refs = units[self.parent + CHILD_ROW].bits();
         if Q::ANY {
             let mut leaf = AnyLeaf::<T>::new(&self.local, self.triangle.t);
             leaf.test_many(simd, units, refs, self.leaves, &mut self.skip_t);

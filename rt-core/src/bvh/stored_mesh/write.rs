@@ -152,7 +152,8 @@ impl<S: PageSink> StoredMeshWriter<S> {
     }
 
     /// The angle in degrees by which stored normals may be off, from here on: they are stored with
-    /// unit length, in as few bits as it allows. As given, in 96 bits, with 0 and without it.
+    /// unit length, in as few bits as it allows. As given, in 96 bits, without it and with 0 or
+    /// less, and where 32 bits do not suffice or a normal of the page has no direction.
     pub fn set_normal_tolerance(&mut self, degrees: f64) {
         self.normal_tolerance = degrees;
     }
