@@ -78,7 +78,7 @@ fn store_file(
 ) -> anyhow::Result<StoredMeshReport> {
     let named =
         |extension: &str| file.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension));
-    let mut storing = Storing::new(common, args, memory, cancel);
+    let mut job = StoreJob::new(common, args, memory, cancel);
     if named("stl")
         && args.color_by.is_none()
         && let Some(pieces) = StlPieces::open(file, PIECE)?
@@ -86,7 +86,7 @@ fn store_file(
         let bar = common.progress(pieces.triangles(), "storing");
         for piece in pieces {
             let mesh = piece?;
-            storing.add(&mesh)?;
+            job.add(&mesh)?;
             bar.inc(mesh.num_triangles() as u64);
         }
     } else if named("ply")
@@ -94,7 +94,7 @@ fn store_file(
     {
         let (bar, origin) = (common.progress(pieces.faces(), "storing"), pieces.origin());
         while let Some(piece) = pieces.next() {
-            storing.add_file(file, &piece?, Some(origin))?;
+            job.add_file(file, &piece?, Some(origin))?;
             bar.set_position(pieces.faces_read());
         }
     } else if named("pvtp")
@@ -107,14 +107,14 @@ fn store_file(
             // A process without a part of the surface writes a piece without points, and often
             // without the arrays of the others.
             if !is_empty(&opened) {
-                storing.add_file(piece, &opened, storing.origin())?;
+                job.add_file(piece, &opened, job.origin())?;
             }
             bar.inc(1);
         }
     } else {
-        storing.add_file(file, &datasets::read::open(file)?, None)?;
+        job.add_file(file, &datasets::read::open(file)?, None)?;
     }
-    storing.finish(file)
+    job.finish(file)
 }
 
 /// Whether a file has no points.
@@ -126,7 +126,7 @@ fn is_empty(opened: &LoadedFile) -> bool {
 }
 
 /// A file that is being written.
-struct Storing<'a> {
+struct StoreJob<'a> {
     common: CommonArgs,
     args: &'a StoreArgs,
     memory: usize,
@@ -138,10 +138,10 @@ struct Storing<'a> {
     has_normals: bool,
 }
 
-impl<'a> Storing<'a> {
+impl<'a> StoreJob<'a> {
     fn new(common: CommonArgs, args: &'a StoreArgs, memory: usize, cancel: &'a Cancel) -> Self {
         let (writer, warned, has_normals) = (None, HashSet::new(), false);
-        Storing { common, args, memory, cancel, writer, warned, has_normals }
+        StoreJob { common, args, memory, cancel, writer, warned, has_normals }
     }
 
     fn origin(&self) -> Option<DVec3> {
@@ -253,13 +253,13 @@ fn store_wavelet(
     let grid = Wavelet::with_points(POINTS).grid()?;
     let isovalues = isovalues_for(&grid, millions as usize * 1_000_000)?;
     let options = Options { normals: !args.no_attributes, ..Options::default() };
-    let mut storing = Storing::new(common, args, memory, cancel);
+    let mut job = StoreJob::new(common, args, memory, cancel);
     let bar = common.progress(isovalues.len() as u64, "storing");
     for (number, isovalue) in isovalues.iter().enumerate() {
         let surface = isosurface::extract(&grid, &[*isovalue], options)
             .cure("give --wavelet fewer millions")?;
-        storing.add(&surface.mesh)?;
+        job.add(&surface.mesh)?;
         bar.set_position(number as u64 + 1);
     }
-    storing.finish(&args.out)
+    job.finish(&args.out)
 }

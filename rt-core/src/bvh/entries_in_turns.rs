@@ -12,7 +12,7 @@ use super::layout::wide::{CHILD_ROW, ChildRef, MAX_DEPTH};
 use super::query::{HitQuery, TriangleTest};
 use super::world::World;
 use crate::bvh::traverse::block_boxes::BlockSetup;
-use crate::bvh::traverse::interleaved::{Opened, RayStack, open_node, pop_nearer};
+use crate::bvh::traverse::interleaved::{NodeHits, RayStack, open_node, pop_nearer};
 use crate::bvh::traverse::packet::GROUPS;
 use crate::bvh::traverse::single::{LeafTest, RaySetup, inflate_t};
 use crate::bvh::traverse::tree_view::TreeView;
@@ -148,7 +148,7 @@ impl<'w, 'r, T: TriangleTest, Q: HitQuery> Lane<'w, 'r, T, Q> {
         // Entries wait for their turn by distance; triangles are tested together.
         let together = self.inside.is_some();
         let at = self.current.unit();
-        let Opened { leaves, next } =
+        let NodeHits { leaves, next } =
             open_node::<S, Q>(simd, &self.tree, at, ray, self.skip_t, together, stack);
         (self.leaves, self.parent) = (leaves, at);
         self.current = match next {

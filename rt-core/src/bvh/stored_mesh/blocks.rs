@@ -27,11 +27,11 @@ const FEWEST_GROUPS: usize = 3;
 struct Room {
     /// Rays on their way to pages, and in one.
     outer: Box<Packet>,
-    inner: InPage,
+    inner: PageRays,
 }
 
 /// The rays that enter a page, and what they hit there.
-struct InPage {
+struct PageRays {
     packet: Box<Packet>,
     rays: [RayBlock; GROUPS],
     hits: [HitBlock; GROUPS],
@@ -44,7 +44,7 @@ thread_local! {
 impl Room {
     fn new() -> Box<Room> {
         let (rays, hits) = ([RayBlock::INACTIVE; GROUPS], [HitBlock::MISS; GROUPS]);
-        let inner = InPage { packet: Packet::new(), rays, hits };
+        let inner = PageRays { packet: Packet::new(), rays, hits };
         Box::new(Room { outer: Packet::new(), inner })
     }
 }
@@ -84,7 +84,7 @@ struct Rays<'a, Q> {
     rays: &'a [RayBlock],
     hits: &'a mut [HitBlock],
     instance: u32,
-    inner: &'a mut InPage,
+    inner: &'a mut PageRays,
     query: PhantomData<Q>,
 }
 
@@ -113,7 +113,7 @@ impl<Q: HitQuery> Rays<'_, Q> {
         reached: u16,
         lanes: impl Fn(usize) -> u16,
     ) -> u16 {
-        let InPage { packet, rays: local, hits: found } = &mut *self.inner;
+        let PageRays { packet, rays: local, hits: found } = &mut *self.inner;
         let (mut n, mut entered) = (0, [0; GROUPS]);
         for g in set_bits(reached) {
             let limits = limits_of::<Q>(&self.rays[g], &self.hits[g]);

@@ -116,7 +116,7 @@ impl<'r, L: Copy> Lane<'r, L> {
         L: LeafTest<S>,
     {
         let at = self.current.unit();
-        let Opened { leaves, next } =
+        let NodeHits { leaves, next } =
             open_node::<S, L::Query>(simd, tree, at, self.ray, self.skip_t, true, stack);
         (self.leaves, self.parent) = (leaves, at);
         self.current = match next {
@@ -127,7 +127,7 @@ impl<'r, L: Copy> Lane<'r, L> {
 }
 
 /// What a node has for a ray.
-pub(crate) struct Opened {
+pub(crate) struct NodeHits {
     /// Leaves to test now: a set of slots.
     pub(crate) leaves: u32,
     /// The child to visit next; `None` when it is on the stack.
@@ -146,7 +146,7 @@ pub(crate) fn open_node<S: Simd, Q: HitQuery>(
     skip_t: f32,
     together: bool,
     stack: &mut RayStack<'_>,
-) -> Opened {
+) -> NodeHits {
     count(Counter::Nodes, 1);
     let units = tree.units;
     let node: &[Unit; NODE_UNITS] =
@@ -171,7 +171,7 @@ pub(crate) fn open_node<S: Simd, Q: HitQuery>(
         prefetch::<3, _>(units, if set == 0 { at } else { leaf.unit() });
     }
     let next = push_children::<S, Q, false>(simd, units, node, near, hit & !leaves, stack);
-    Opened { leaves, next }
+    NodeHits { leaves, next }
 }
 
 /// The next subtree nearer than `skip_t` above the first `base` entries of the stack, or
