@@ -20,7 +20,7 @@ const STRATEGIES: [Strategy; 4] =
 fn lying(
     inner: threads::ThreadComm,
     lie: impl Fn(usize, &mut Vec<u8>),
-) -> Meddling<impl FnMut(Outgoing, &mut Vec<u8>) -> bool> {
+) -> Meddling<threads::ThreadComm, impl FnMut(Outgoing, &mut Vec<u8>) -> bool> {
     let is_liar = inner.rank() == LIAR;
     Meddling::new(inner, move |outgoing, message| {
         if let Outgoing::Gathered(number) = outgoing

@@ -7,6 +7,7 @@ mod mutation;
 mod words;
 
 use composite::CommError;
+use composite::comm::sim;
 use composite::render::FrameError;
 use composite::render::light::{
     Gas, GasBrick, LightOptions, LightOutput, LightTechnique, Shot, Strided, photograph,
@@ -299,7 +300,7 @@ fn rays_with_random_changes_end_in_the_picture_or_in_named_errors() {
             _ => Outgoing::Message(random.below(4)),
         };
         let case = format!("seed {seed}: rank {culprit}, {what:?}");
-        let ends = threads::run(RANKS, |inner| {
+        let ends = sim::run(RANKS, sim::Network::QDR, sim::Compute::Given, |inner| {
             let rank = inner.rank();
             let mut comm = Meddling::new(inner, |outgoing, message| {
                 let mut random = Random(!seed);

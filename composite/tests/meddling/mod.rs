@@ -1,6 +1,10 @@
-//! A rank among threads whose messages are changed on their way: what tests of faults share.
+//! A rank whose messages are changed on their way: what tests of faults share.
+//!
+//! Tests that must end in the same way on a busy machine use simulated ranks with
+//! [`sim::Compute::Given`](composite::comm::sim::Compute): their timeouts pass in virtual time, and
+//! messages come in the same order in every run.
 use composite::comm::{Arrival, Receive};
-use composite::{CommError, Communicator, threads};
+use composite::{CommError, Communicator};
 use std::time::Duration;
 
 /// What is about to be sent, with its number among those of its kind, from 0.
@@ -13,9 +17,10 @@ pub(crate) enum Outgoing {
 }
 
 /// Calls `meddle` with all that this rank sends, but for collective calls of the transport itself.
-/// What it returns false for is not sent.
-pub(crate) struct Meddling<F> {
-    inner: threads::ThreadComm,
+/// What it returns false for is not sent. The ranks do not say that they are on one machine, so
+/// they send what ranks of several machines send.
+pub(crate) struct Meddling<C, F> {
+    inner: C,
     meddle: F,
     messages: usize,
     gathered: usize,
@@ -24,13 +29,13 @@ pub(crate) struct Meddling<F> {
     pub(crate) requested_bytes: usize,
 }
 
-impl<F: FnMut(Outgoing, &mut Vec<u8>) -> bool> Meddling<F> {
-    pub(crate) fn new(inner: threads::ThreadComm, meddle: F) -> Self {
+impl<C: Communicator, F: FnMut(Outgoing, &mut Vec<u8>) -> bool> Meddling<C, F> {
+    pub(crate) fn new(inner: C, meddle: F) -> Self {
         Self { inner, meddle, messages: 0, gathered: 0, requested_bytes: 0 }
     }
 }
 
-impl<F: FnMut(Outgoing, &mut Vec<u8>) -> bool> Communicator for Meddling<F> {
+impl<C: Communicator, F: FnMut(Outgoing, &mut Vec<u8>) -> bool> Communicator for Meddling<C, F> {
     fn rank(&self) -> usize {
         self.inner.rank()
     }
@@ -41,6 +46,10 @@ impl<F: FnMut(Outgoing, &mut Vec<u8>) -> bool> Communicator for Meddling<F> {
 
     fn now(&self) -> f64 {
         self.inner.now()
+    }
+
+    fn working_secs(&self) -> f64 {
+        self.inner.working_secs()
     }
 
     fn send(&mut self, to: usize, tag: u32, mut message: Vec<u8>) -> Result<(), CommError> {
@@ -84,6 +93,18 @@ impl<F: FnMut(Outgoing, &mut Vec<u8>) -> bool> Communicator for Meddling<F> {
         self.gathered += 1;
         (self.meddle)(Outgoing::Gathered(self.gathered - 1), &mut message);
         self.inner.all_gather(&message, longest, timeout)
+    }
+
+    fn alive(&mut self) -> Result<(), CommError> {
+        self.inner.alive()
+    }
+
+    fn throttle_sends(&mut self, tag: u32, most: usize, patience: Duration) {
+        self.inner.throttle_sends(tag, most, patience);
+    }
+
+    fn root_cause(&mut self, error: CommError) -> CommError {
+        self.inner.root_cause(error)
     }
 
     fn abort(&mut self, reason: &str) {

@@ -21,7 +21,7 @@ const LENGTHS: usize = RANKS;
 fn lying(
     inner: threads::ThreadComm,
     lie: impl Fn(&mut [u32]),
-) -> Meddling<impl FnMut(Outgoing, &mut Vec<u8>) -> bool> {
+) -> Meddling<threads::ThreadComm, impl FnMut(Outgoing, &mut Vec<u8>) -> bool> {
     let is_liar = inner.rank() == LIAR;
     Meddling::new(inner, move |outgoing, message| {
         if is_liar && matches!(outgoing, Outgoing::Gathered(_)) {

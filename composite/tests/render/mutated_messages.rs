@@ -1,15 +1,17 @@
 //! Messages of the renderer with random changes: each run ends with the right image or with named
 //! errors on all ranks, never with a panic, and asks for no more memory than the honest run by a
 //! small factor. Half of the changes have a right checksum, so that what reads the numbers behind
-//! it is tried too. The seeds are fixed: every run of this test is the same.
+//! it is tried too. The seeds are fixed and time is virtual: every run of this test is the same, on
+//! a busy machine too.
 use crate::distributed::share;
 use crate::meddling::{Meddling, Outgoing};
 use crate::mutation::{Random, mutate};
 use crate::scenes::{self, Case};
 use crate::words::change_words;
 use crate::{bits, frame_options};
+use composite::comm::sim;
 use composite::render::{DataParallel, FrameError, FrameOptions, FrameOutput, SecondaryRayPolicy};
-use composite::{CommError, Communicator, threads};
+use composite::{CommError, Communicator};
 use rt_core::glam::DVec3;
 use std::time::Duration;
 
@@ -29,7 +31,7 @@ fn frame(
     culprit: usize,
     meddle: impl Fn(Outgoing, &mut Vec<u8>) + Sync,
 ) -> Vec<Result<Ended, String>> {
-    let results = threads::run(RANKS, |inner| {
+    let results = sim::run(RANKS, sim::Network::QDR, sim::Compute::Given, |inner| {
         let rank = inner.rank();
         let mut comm = Meddling::new(inner, |outgoing, message| {
             if rank == culprit {
