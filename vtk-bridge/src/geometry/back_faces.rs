@@ -7,7 +7,7 @@
 
 use rt_core::glam::{DVec3, Vec3};
 use rt_core::math::Aabb;
-use rt_core::mesh::TriMesh;
+use rt_core::mesh::{PerElement, TriMesh};
 use rt_core::ray::Ray;
 use rt_core::shapes::{Shape, ShapeHit, ShapeSurface};
 use std::sync::Arc;
@@ -82,8 +82,8 @@ impl Shape for BackFaces {
         let (u, v) = (f64::from(hit.u), f64::from(hit.v));
         let face = (b - a).cross(c - a).as_vec3().normalize_or_zero();
         let shading = self.mesh.normals.as_ref().and_then(|n| match n.per {
-            rt_core::mesh::PerElement::Face => n.values.get(i).copied(),
-            rt_core::mesh::PerElement::Vertex => {
+            PerElement::Face => n.values.get(i).copied(),
+            PerElement::Vertex => {
                 let [x, y, z] = self.mesh.indices[i].map(|k| n.values.get(k as usize).copied());
                 Some(x? * (1.0 - hit.u - hit.v) + y? * hit.u + z? * hit.v)
             }
@@ -92,8 +92,8 @@ impl Shape for BackFaces {
         ShapeSurface {
             point,
             point_error: point.abs().max_element() * 4.0 * f32::EPSILON,
-            normal: shading.map_or(face, |n| n.try_normalize().unwrap_or(face)),
-            shading_normal: None,
+            normal: face,
+            shading_normal: shading,
             scalar: None,
             color: None,
         }
@@ -103,6 +103,7 @@ impl Shape for BackFaces {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rt_core::mesh::Attribute;
 
     #[test]
     fn backs_are_met_from_behind_only_and_before_the_surface() {
@@ -115,5 +116,20 @@ mod tests {
         assert!(hit.t < 2.0 && hit.t > 1.9999, "{hit:?}");
         let s = back_faces.surface(0, &hit, &from(-2.0));
         assert_eq!((s.normal, s.point.z), (Vec3::Z, 0.0));
+    }
+
+    #[test]
+    fn backs_with_smooth_normals_keep_the_normal_of_the_triangle_for_rays() {
+        // Rays that start along a smooth normal would start on the wrong side of the triangle.
+        let smooth = Vec3::new(0.8, 0.0, 0.6);
+        let mut mesh = TriMesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]]);
+        mesh.normals = Some(Attribute { per: PerElement::Vertex, values: vec![smooth; 3] });
+        let back_faces = BackFaces::of(Arc::new(mesh));
+        let ray = Ray::new(Vec3::new(0.25, 0.25, -2.0), Vec3::Z);
+        let hit = back_faces.closest(0, &ray).expect("the back");
+        let s = back_faces.surface(0, &hit, &ray);
+        assert_eq!(s.normal, Vec3::Z);
+        let shading = s.shading_normal.expect("the mesh has normals");
+        assert!((shading - smooth).length() < 1e-6, "{shading}");
     }
 }

@@ -122,13 +122,15 @@ impl Shape for ColoredShape {
 
     fn surface(&self, prim: u32, hit: &ShapeHit, ray: &Ray) -> ShapeSurface {
         let surface = self.shape.surface(prim, hit, ray);
+        // Samplers and attributes see the smooth normal, as they do on meshes.
+        let normal = surface.shading_normal.and_then(Vec3::try_normalize).unwrap_or(surface.normal);
         let weights = self.weights.of([hit.u, hit.v]);
         let place = HitPoint {
             topology: &self.topology,
             primitive: prim,
             weights,
             point: self.shape.origin() + surface.point.as_dvec3(),
-            normal: surface.normal.as_dvec3(),
+            normal: normal.as_dvec3(),
             world_from_object: &self.world_from_object,
         };
         ShapeSurface { color: Some(self.surface_color.at(&place)), ..surface }
@@ -212,16 +214,14 @@ impl Shape for TriangleShape {
         let [a, b, c] = corners.map(|p| p.as_dvec3());
         let point = a * (1.0 - u - v) + b * u + c * v;
         let flat = (b - a).cross(c - a).normalize_or(-ray.dir.as_dvec3().normalize());
-        let normal = match &self.0.normals {
-            Some(n) if n.per == PerElement::Vertex => {
-                let id = self.0.indices[prim as usize];
-                let at = |k: usize| n.values[id[k] as usize].as_dvec3();
-                let mixed = (at(0) * (1.0 - u - v) + at(1) * u + at(2) * v).normalize_or(flat);
-                // On the side of the flat one, which decides what is outside.
-                if mixed.dot(flat) < 0.0 { -mixed } else { mixed }
-            }
-            _ => flat,
-        };
+        let vertex_normals = self.0.normals.as_ref().filter(|n| n.per == PerElement::Vertex);
+        let shading = vertex_normals.map(|n| {
+            let id = self.0.indices[prim as usize];
+            let at = |k: usize| n.values[id[k] as usize].as_dvec3();
+            let mixed = at(0) * (1.0 - u - v) + at(1) * u + at(2) * v;
+            // On the side of the flat one, which decides what is outside.
+            if mixed.dot(flat) < 0.0 { -mixed } else { mixed }
+        });
         let size = corners.iter().fold(0f64, |m, p| m.max(f64::from(p.abs().max_element())));
         let rounded = point.as_vec3();
         // Half an ulp of each coordinate plus a few roundings of the weights in f64.
@@ -229,10 +229,31 @@ impl Shape for TriangleShape {
         ShapeSurface {
             point: rounded,
             point_error,
-            normal: normal.as_vec3(),
-            shading_normal: None,
+            normal: flat.as_vec3(),
+            shading_normal: shading.map(|n| n.as_vec3()),
             scalar: None,
             color: None,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rt_core::mesh::Attribute;
+
+    #[test]
+    fn triangles_with_smooth_normals_keep_the_normal_of_the_triangle_for_rays() {
+        // Rays that start along a smooth normal would start on the wrong side of the triangle.
+        let smooth = Vec3::new(0.8, 0.0, -0.6);
+        let mut mesh = TriMesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]]);
+        mesh.normals = Some(Attribute { per: PerElement::Vertex, values: vec![smooth; 3] });
+        let shape = TriangleShape(Arc::new(mesh));
+        let ray = Ray::new(Vec3::new(0.25, 0.25, -2.0), Vec3::Z);
+        let hit = shape.closest(0, &ray).expect("a hit");
+        let surface = shape.surface(0, &hit, &ray);
+        assert_eq!(surface.normal, Vec3::Z);
+        let shading = surface.shading_normal.expect("the mesh has normals");
+        assert!((shading + smooth).length() < 1e-6, "{shading} is on the outside");
     }
 }
