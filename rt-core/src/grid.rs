@@ -143,12 +143,7 @@ impl Grid {
     #[inline]
     pub fn gradient(&self, p: Vec3) -> Vec3 {
         let (c, f) = self.cell_of(p);
-        let v = self.corners(c);
-        let l = |a: f32, b: f32, t: f32| a + (b - a) * t;
-        let gx = l(l(v[1] - v[0], v[3] - v[2], f.y), l(v[5] - v[4], v[7] - v[6], f.y), f.z);
-        let gy = l(l(v[2] - v[0], v[3] - v[1], f.x), l(v[6] - v[4], v[7] - v[5], f.x), f.z);
-        let gz = l(l(v[4] - v[0], v[5] - v[1], f.x), l(v[6] - v[2], v[7] - v[3], f.x), f.y);
-        Vec3::new(gx, gy, gz) / self.spacing.as_vec3()
+        gradient_in_cell(&self.corners(c), f, self.spacing)
     }
 
     /// The eight corner values of the cell whose lowest point is `c`, x fastest. An axis with one
@@ -185,9 +180,26 @@ impl Grid {
     /// (0..=1). NaN becomes 0.
     #[inline]
     pub fn cell_of(&self, p: Vec3) -> (UVec3, Vec3) {
-        let last = (self.dims - UVec3::ONE).as_vec3();
-        let q = p.max(Vec3::ZERO).min(last);
-        let cell = q.floor().min((last - Vec3::ONE).max(Vec3::ZERO));
-        (cell.as_uvec3(), q - cell)
+        cell_of(self.dims, p)
     }
+}
+
+/// See [`Grid::cell_of`].
+#[inline]
+pub(crate) fn cell_of(dims: UVec3, p: Vec3) -> (UVec3, Vec3) {
+    let last = (dims - UVec3::ONE).as_vec3();
+    let q = p.max(Vec3::ZERO).min(last);
+    let cell = q.floor().min((last - Vec3::ONE).max(Vec3::ZERO));
+    (cell.as_uvec3(), q - cell)
+}
+
+/// Gradient of the trilinear interpolant at the position `f` (0..=1) inside the cell with these
+/// values at its corners, x fastest; in value per world unit.
+#[inline]
+pub(crate) fn gradient_in_cell(v: &[f32; 8], f: Vec3, spacing: DVec3) -> Vec3 {
+    let l = |a: f32, b: f32, t: f32| a + (b - a) * t;
+    let gx = l(l(v[1] - v[0], v[3] - v[2], f.y), l(v[5] - v[4], v[7] - v[6], f.y), f.z);
+    let gy = l(l(v[2] - v[0], v[3] - v[1], f.x), l(v[6] - v[4], v[7] - v[5], f.x), f.z);
+    let gz = l(l(v[4] - v[0], v[5] - v[1], f.x), l(v[6] - v[2], v[7] - v[3], f.x), f.y);
+    Vec3::new(gx, gy, gz) / spacing.as_vec3()
 }

@@ -50,6 +50,7 @@ pub mod grid;
 mod grid_walk;
 pub mod math;
 pub mod mesh;
+pub mod paging;
 pub mod prelude;
 pub mod ray;
 mod ray_cubic;
@@ -57,6 +58,7 @@ pub mod robustness;
 pub mod shapes;
 pub mod simd;
 pub mod stats;
+pub mod stored_volume;
 #[cfg(test)]
 pub(crate) mod test_shapes;
 

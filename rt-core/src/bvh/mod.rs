@@ -36,6 +36,7 @@ mod turned_bounds;
 mod validate;
 mod world;
 
+pub use crate::paging::{PageSink, PageSource, PageUse};
 pub use all_hits::{HitLists, TooManyHits};
 pub use closest_point::{ClosestPoint, NoDistance};
 pub use double_precision::{HitF64, MeshF64, RayF64, WorldF64};
@@ -49,8 +50,7 @@ pub use ray_query::{MaskError, RayQuery};
 pub use refit::{RefitError, RefitReport};
 pub use render_space::RenderSpace;
 pub use stored_mesh::{
-    PageSink, PageSource, PageUse, StoredAttributes, StoredMesh, StoredMeshError, StoredMeshReport,
-    StoredMeshWriter,
+    StoredAttributes, StoredMesh, StoredMeshError, StoredMeshReport, StoredMeshWriter,
 };
 pub(crate) use streams::Coherence;
 pub use streams::StreamError;

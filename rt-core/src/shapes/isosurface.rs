@@ -10,13 +10,15 @@
 //!
 //! "Inside" is value ≥ isovalue: a plateau exactly at the isovalue is solid, not a thick surface.
 
-use super::{Shape, ShapeError, ShapeHit, ShapeSurface, in_range, outward_box, rounded_point};
+use super::isosurface_cell::{
+    Root, SHAPE, check_isovalues, min_max, place_on, root_in_cell, smooth_gradient,
+};
+use super::{Shape, ShapeError, ShapeHit, ShapeSurface, in_range, outward_box};
 use crate::grid::Grid;
-use crate::grid_walk::{Crossing, IndexRay};
+use crate::grid_walk::IndexRay;
 use crate::math::Aabb;
 use crate::ray::Ray;
-use crate::ray_cubic;
-use glam::{DVec3, UVec3, Vec3};
+use glam::{DVec3, UVec3};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -104,12 +106,6 @@ struct BlockScan {
     non_finite: u64,
 }
 
-/// A root: ray parameter, isovalue.
-struct Root {
-    t: f64,
-    isovalue: usize,
-}
-
 impl Isosurface {
     /// Surfaces of `grid` at `isovalues`.
     pub fn new(
@@ -117,27 +113,10 @@ impl Isosurface {
         isovalues: &[f32],
         options: &IsosurfaceOptions,
     ) -> Result<Self, ShapeError> {
-        const SHAPE: &str = "isosurface";
         if grid.dims.min_element() < 2 {
             return Err(ShapeError::NoCells { shape: SHAPE, dims: grid.dims });
         }
-        if isovalues.is_empty() {
-            return Err(ShapeError::Length {
-                shape: SHAPE,
-                field: "isovalues",
-                per: "surface",
-                expected: 1,
-                found: 0,
-            });
-        }
-        if let Some(&value) = isovalues.iter().find(|v| !v.is_finite()) {
-            return Err(ShapeError::Value {
-                shape: SHAPE,
-                field: "isovalue",
-                value,
-                rule: "finite",
-            });
-        }
+        check_isovalues(isovalues)?;
         if !(1..=255).contains(&options.brick_cells) {
             let value = options.brick_cells as f32;
             return Err(ShapeError::Value {
@@ -215,47 +194,12 @@ impl Isosurface {
         let last = (self.grid.dims - UVec3::ONE).to_array().map(i64::from);
         let mut found = None;
         index_ray.walk(lo, hi, last, 1, f64::from(ray.t_min), f64::from(ray.t_max), |crossing| {
-            found = self.root_in_cell(&index_ray, crossing);
+            let corners = self.grid.corners(UVec3::from_array(crossing.cell.map(|c| c as u32)));
+            found = root_in_cell(&corners, &self.isovalues, &index_ray, crossing);
             found.is_none()
         });
         found.filter(|r| in_range(r.t as f32, ray))
     }
-
-    #[inline]
-    fn root_in_cell(&self, ray: &IndexRay, crossing: &Crossing) -> Option<Root> {
-        let corners = self.grid.corners(UVec3::from_array(crossing.cell.map(|c| c as u32)));
-        let (lo, hi) = min_max(&corners);
-        let mut positions = None;
-        let mut best: Option<(f64, usize)> = None;
-        for (n, &iso) in self.isovalues.iter().enumerate() {
-            let crosses = lo < iso && iso <= hi && corners.iter().all(|v| v.is_finite());
-            if !crosses {
-                continue;
-            }
-            let (p, q) = positions.get_or_insert_with(|| ray.fractions(crossing, 1));
-            // Differences first: f32 values minus an f32 are exact in f64 unless 2²⁹ apart, so the
-            // sign at grid points is right.
-            let iso = f64::from(iso);
-            let b = ray_cubic::along(&corners.map(|v| f64::from(v) - iso), p, q);
-            // A ray that starts exactly on the surface touches it there, in any direction.
-            let touches = crossing.entry.is_none() && b[0] == 0.0;
-            if let Some(u) = if touches { Some(0.0) } else { ray_cubic::first_change(&b) }
-                && best.is_none_or(|(least, _)| u < least)
-            {
-                best = Some((u, n));
-            }
-        }
-        best.map(|(u, isovalue)| Root {
-            t: crossing.t0 + u * (crossing.t1 - crossing.t0),
-            isovalue,
-        })
-    }
-}
-
-/// Smallest and largest of eight values; NaN is ignored.
-#[inline]
-fn min_max(v: &[f32; 8]) -> (f32, f32) {
-    v.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), &x| (l.min(x), h.max(x)))
 }
 
 /// Scans the cells `lo..hi`.
@@ -288,33 +232,6 @@ fn scan(grid: &Grid, isovalues: &[f32], lo: UVec3, hi: UVec3) -> BlockScan {
     s
 }
 
-/// Central differences (one-sided at the border) at the corners of the cell around the continuous
-/// index `p`, interpolated; in value per world unit. NaN where a neighbour is.
-pub(crate) fn smooth_gradient(grid: &Grid, p: Vec3) -> Vec3 {
-    let (cell, f) = grid.cell_of(p);
-    let mut sum = Vec3::ZERO;
-    for corner in 0..8u32 {
-        let bit = UVec3::new(corner & 1, corner >> 1 & 1, corner >> 2 & 1);
-        let c = (cell + bit).min(grid.dims - UVec3::ONE);
-        let weight = Vec3::select(bit.cmpeq(UVec3::ONE), f, Vec3::ONE - f).element_product();
-        if weight == 0.0 {
-            continue;
-        }
-        let mut g = [0f32; 3];
-        for a in 0..3 {
-            let (mut lo, mut hi) = (c.to_array(), c.to_array());
-            lo[a] = lo[a].saturating_sub(1);
-            hi[a] = (hi[a] + 1).min(grid.dims[a] - 1);
-            let width = (hi[a] - lo[a]) as f32 * grid.spacing[a] as f32;
-            if width > 0.0 {
-                g[a] = (grid.at(hi[0], hi[1], hi[2]) - grid.at(lo[0], lo[1], lo[2])) / width;
-            }
-        }
-        sum += weight * Vec3::from_array(g);
-    }
-    sum
-}
-
 impl Shape for Isosurface {
     fn num_primitives(&self) -> usize {
         self.blocks.len()
@@ -337,44 +254,20 @@ impl Shape for Isosurface {
     }
 
     fn surface(&self, prim: u32, hit: &ShapeHit, ray: &Ray) -> ShapeSurface {
-        // The root again in f64, in the few ulps around the reported parameter.
-        let near = Ray {
-            t_min: hit.t.next_down().max(ray.t_min),
-            t_max: hit.t.next_up().next_up(),
-            ..*ray
-        };
-        let root = self.first(prim, &near);
-        let t = root.as_ref().map_or(f64::from(hit.t), |r| r.t);
-        let isovalue = root.map_or(hit.u as usize, |r| r.isovalue).min(self.isovalues.len() - 1);
-        let index_ray = self.index_ray(ray);
-        let last = (self.grid.dims - UVec3::ONE).as_dvec3();
-        let index = DVec3::from_array(index_ray.at(t)).clamp(DVec3::ZERO, last);
-        // Rounding of o + t·d in index space: relative to the largest of its terms.
-        let terms = (0..3)
-            .map(|a| (index_ray.o[a].abs() + (t * index_ray.d[a]).abs()) * self.grid.spacing[a])
-            .fold(0.0, f64::max);
-        let (point, point_error) =
-            rounded_point(index * self.grid.spacing, 8.0 * f64::EPSILON * terms);
-        let at = index.as_vec3();
+        let Grid { dims, origin, spacing, .. } = *self.grid;
+        let place =
+            place_on(&self.index_ray(ray), dims, spacing, hit, ray, |near| self.first(prim, near));
+        let at = place.index.as_vec3();
         let gradient = match self.normals {
             IsosurfaceNormals::Surface => self.grid.gradient(at),
-            IsosurfaceNormals::Smooth => smooth_gradient(&self.grid, at),
+            IsosurfaceNormals::Smooth => {
+                smooth_gradient(dims, spacing, at, |p| self.grid.at(p.x, p.y, p.z))
+            }
         };
-        // In f64: gradients of 1e-30 per metre have squares below f32's range.
-        let normal = (-gradient.as_dvec3()).normalize_or(-ray.dir.as_dvec3().normalize_or_zero());
         let scalar = match &self.color_by {
-            None => self.isovalues[isovalue],
-            Some(g) => g.value(
-                ((self.grid.origin - g.origin + index * self.grid.spacing) / g.spacing).as_vec3(),
-            ),
+            None => self.isovalues[place.isovalue.min(self.isovalues.len() - 1)],
+            Some(g) => g.value(((origin - g.origin + place.index * spacing) / g.spacing).as_vec3()),
         };
-        ShapeSurface {
-            point,
-            point_error,
-            normal: normal.as_vec3(),
-            shading_normal: None,
-            scalar: Some(scalar),
-            color: None,
-        }
+        place.surface(gradient, scalar, ray)
     }
 }

@@ -5,6 +5,7 @@ mod cylinder;
 mod error;
 mod frustum;
 mod isosurface;
+pub(crate) mod isosurface_cell;
 mod part;
 mod rounded_cone;
 mod sphere;

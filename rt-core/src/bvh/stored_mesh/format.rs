@@ -26,6 +26,7 @@
 
 use super::attributes::MeshAttributes;
 use crate::math::Aabb;
+use crate::paging::fields::{Fields, checksum, get, get_u32, get_u64};
 use glam::{DVec3, Vec3};
 
 pub(super) const MAGIC: &[u8; 8] = b"RTSVMESH";
@@ -36,11 +37,6 @@ pub(super) const HEADER_BYTES: usize = 128;
 pub(super) const ENTRY_BYTES: usize = 64;
 /// Bytes of a unit of a page.
 pub(super) const UNIT_BYTES: u64 = 32;
-
-/// The checksum of all parts.
-pub(super) fn checksum(bytes: &[u8]) -> u32 {
-    crc32fast::hash(bytes)
-}
 
 /// What the header says.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -122,31 +118,11 @@ pub(super) enum NoHeader {
     Damaged,
 }
 
-/// Numbers at fixed places.
-struct Fields<'b>(&'b mut [u8]);
-
-impl Fields<'_> {
-    fn put<const N: usize>(&mut self, at: usize, bytes: [u8; N]) {
-        self.0[at..at + N].copy_from_slice(&bytes);
+/// Puts the corners of a box at a place.
+fn put_box(fields: &mut Fields<'_>, at: usize, b: Aabb) {
+    for (i, x) in b.min.to_array().into_iter().chain(b.max.to_array()).enumerate() {
+        fields.put(at + 4 * i, x.to_le_bytes());
     }
-
-    fn put_box(&mut self, at: usize, b: Aabb) {
-        for (i, x) in b.min.to_array().into_iter().chain(b.max.to_array()).enumerate() {
-            self.put(at + 4 * i, x.to_le_bytes());
-        }
-    }
-}
-
-fn get<const N: usize>(bytes: &[u8], at: usize) -> [u8; N] {
-    std::array::from_fn(|i| bytes[at + i])
-}
-
-fn get_u32(bytes: &[u8], at: usize) -> u32 {
-    u32::from_le_bytes(get(bytes, at))
-}
-
-fn get_u64(bytes: &[u8], at: usize) -> u64 {
-    u64::from_le_bytes(get(bytes, at))
 }
 
 fn get_box(bytes: &[u8], at: usize) -> Aabb {
@@ -168,7 +144,7 @@ impl Header {
         for (i, x) in self.origin.to_array().into_iter().enumerate() {
             fields.put(56 + 8 * i, x.to_le_bytes());
         }
-        fields.put_box(80, self.bounds);
+        put_box(&mut fields, 80, self.bounds);
         fields.put(104, self.table_checksum.to_le_bytes());
         fields.put(108, self.attributes.bits().to_le_bytes());
         for (i, x) in self.attributes.scalars.unwrap_or_default().into_iter().enumerate() {
@@ -219,7 +195,7 @@ impl PageEntry {
         for (i, number) in numbers.into_iter().enumerate() {
             fields.put(16 + 4 * i, number.to_le_bytes());
         }
-        fields.put_box(32, self.bounds);
+        put_box(&mut fields, 32, self.bounds);
         fields.put(56, self.attribute_words.to_le_bytes());
         fields.put(60, self.attribute_checksum.to_le_bytes());
         bytes

@@ -20,8 +20,6 @@
 
 mod attributes;
 mod blocks;
-mod bytes;
-mod cache;
 mod error;
 mod format;
 mod octahedral;
@@ -32,11 +30,11 @@ mod tests;
 mod write;
 
 pub(crate) use blocks::trace;
-pub use bytes::{PageSink, PageSource};
-pub use cache::PageUse;
 pub use error::StoredMeshError;
 pub use read::{StoredAttributes, StoredMesh};
 pub use write::{StoredMeshReport, StoredMeshWriter};
 
+#[cfg(doc)]
+use crate::paging::{PageSink, PageSource};
 #[cfg(doc)]
 use crate::shapes::Shape;

@@ -2,22 +2,36 @@
 
 use super::StoredMeshReport;
 use super::attributes::{HitAttributes, PageAttributes};
-use super::bytes::PageSource;
-use super::cache::{PageCache, PageUse, Part};
 use super::error::StoredMeshError;
 use super::format::{
-    Attributes, ENTRY_BYTES, HEADER_BYTES, Header, MAGIC, NoHeader, PageEntry, VERSION, checksum,
+    Attributes, ENTRY_BYTES, HEADER_BYTES, Header, MAGIC, NoHeader, PageEntry, VERSION,
 };
 use super::page::{Page, PageHit};
-use crate::bvh::compact::new_key;
 use crate::bvh::layout::wide::Unit;
 use crate::math::Aabb;
+use crate::paging::fields::checksum;
+use crate::paging::{PageCache, PageSource, PageUse, Paged};
 use crate::ray::Ray;
 use crate::shapes::{Shape, ShapeHit, ShapeSurface, rounded_point};
 use fearless_simd::Level;
 use glam::DVec3;
 use std::any::Any;
 use std::sync::OnceLock;
+
+/// What the cache holds. Attributes of pages come and go by themselves.
+enum Part {
+    Page(Page),
+    Attributes(PageAttributes),
+}
+
+impl Paged for Part {
+    fn bytes(&self) -> usize {
+        match self {
+            Part::Page(page) => page.bytes(),
+            Part::Attributes(attributes) => attributes.bytes(),
+        }
+    }
+}
 
 /// A mesh in bytes elsewhere, as a shape: its primitives are pages. [`super::StoredMeshWriter`]
 /// stores meshes, and has an example. The member `datasets` opens
@@ -26,7 +40,7 @@ pub struct StoredMesh {
     source: Box<dyn PageSource>,
     header: Header,
     table: Vec<PageEntry>,
-    cache: PageCache,
+    cache: PageCache<Part>,
     level: Level,
     /// The first page that could not be read, and why.
     failure: OnceLock<String>,
@@ -84,7 +98,7 @@ impl StoredMesh {
             }
         }
         let places = if header.attributes.any() { 2 * table.len() } else { table.len() };
-        let cache = PageCache::new(new_key(), places, budget);
+        let cache = PageCache::new(places, budget);
         let (level, failure) = (Level::new(), OnceLock::new());
         let source = Box::new(source);
         Ok(StoredMesh { source, header, table, cache, level, failure })

@@ -3,6 +3,7 @@
 use super::*;
 use crate::bvh::{BuildOptions, Geometry, Instance, World};
 use crate::mesh::{Attribute, MeshSlices, PerElement, TriMesh};
+use crate::paging::PageSource;
 use crate::ray::{HitBlock, LANES, Ray, RayBlock};
 use crate::shapes::Shape;
 use crate::test_shapes::Random;
@@ -241,7 +242,8 @@ fn a_page_that_changes_below_us_is_a_failure_and_not_a_wrong_hit_in_silence() {
 
 /// The bytes with the checksums of what they are now.
 fn resealed(mut bytes: Vec<u8>) -> Vec<u8> {
-    use super::format::{ENTRY_BYTES, HEADER_BYTES, Header, PageEntry, UNIT_BYTES, checksum};
+    use super::format::{ENTRY_BYTES, HEADER_BYTES, Header, PageEntry, UNIT_BYTES};
+    use crate::paging::fields::checksum;
     let header: &[u8; HEADER_BYTES] = bytes.first_chunk().expect("a header");
     let header = Header::read(header).expect("a sound header");
     let table = header.table as usize;
@@ -293,7 +295,7 @@ fn files_of_the_first_version_can_be_read() {
     let (mut bytes, report) = store(&ball(20), 1000);
     bytes[8] = 1;
     bytes[12..16].fill(0);
-    let sum = super::format::checksum(&bytes[..128]);
+    let sum = crate::paging::fields::checksum(&bytes[..128]);
     bytes[12..16].copy_from_slice(&sum.to_le_bytes());
     let stored = StoredMesh::open(bytes, 0).expect("version 1");
     assert_eq!(stored.report(), report);

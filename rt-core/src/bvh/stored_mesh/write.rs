@@ -1,11 +1,8 @@
 //! Stores a mesh piece by piece.
 
 use super::attributes::{self, MeshAttributes};
-use super::bytes::PageSink;
 use super::error::StoredMeshError;
-use super::format::{
-    Attributes, ENTRY_BYTES, HEADER_BYTES, Header, PageEntry, UNIT_BYTES, checksum,
-};
+use super::format::{Attributes, ENTRY_BYTES, HEADER_BYTES, Header, PageEntry, UNIT_BYTES};
 use crate::bvh::build::UNWATCHED;
 use crate::bvh::compact::{CompactBvh, divide};
 use crate::bvh::layout::local_frame::LocalFrame;
@@ -13,6 +10,8 @@ use crate::bvh::layout::triangles::TriWriter;
 use crate::bvh::options::BuildQuality;
 use crate::math::Aabb;
 use crate::mesh::{Attribute, MeshSlices, PerElement, TriMesh};
+use crate::paging::PageSink;
+use crate::paging::fields::checksum;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 

@@ -1,6 +1,6 @@
-//! Where the bytes of stored meshes are: in a file of another member, in memory, or elsewhere.
+//! Where the bytes of a file are: in a file of another member, in memory, or elsewhere.
 
-/// Bytes that a stored mesh is read from.
+/// Bytes that a stored mesh or volume is read from.
 pub trait PageSource: Send + Sync {
     /// What errors call the bytes: the path of a file, for example.
     fn name(&self) -> String;
@@ -18,7 +18,7 @@ pub trait PageSource: Send + Sync {
     fn read(&self, offset: u64, bytes: &mut [u8]) -> Result<(), String>;
 }
 
-/// Bytes that a mesh is stored in.
+/// Bytes that a mesh or volume is stored in.
 pub trait PageSink {
     /// What errors call the bytes.
     fn name(&self) -> String;

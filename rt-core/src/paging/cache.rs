@@ -1,55 +1,52 @@
-//! The pages in memory: those that rays have used last, within a budget. Attributes of pages are
-//! pages of their own here: they come and go by themselves.
+//! The pages in memory: those that rays have used last, within a budget.
 //!
 //! Each page has a lock, so that a page is read once although several threads wait for it. What
 //! leaves is decided by a second chance: pages stand in a queue, and one that was used since it was
 //! looked at last goes to the end. Threads keep the last few pages that they used besides, so that
 //! most rays take no lock.
 
-use super::attributes::PageAttributes;
-use super::page::Page;
+use std::any::Any;
 use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 
-/// Pages that each thread keeps.
-const RECENT: usize = 16;
+/// Pages that each thread keeps, by the logarithm of their number.
+const RECENT_LOG2: u32 = 4;
 
-type RecentPages = [Option<(u64, u32, Arc<Part>)>; RECENT];
+/// The key of the cache, the number of the page, and the page.
+type RecentPage = Option<(u64, u32, Arc<dyn Any + Send + Sync>)>;
 
 thread_local! {
-    static RECENTLY_USED: RefCell<RecentPages> = const { RefCell::new([const { None }; RECENT]) };
+    static RECENTLY_USED: RefCell<[RecentPage; 1 << RECENT_LOG2]> =
+        const { RefCell::new([const { None }; 1 << RECENT_LOG2]) };
 }
 
-/// What the cache holds.
-pub(super) enum Part {
-    Page(Page),
-    Attributes(PageAttributes),
+/// Where a thread keeps a page. Numbers of neighbouring bricks of a volume differ by powers of two,
+/// which the low bits of numbers would bring to one place (Fibonacci hashing: Knuth, The Art of
+/// Computer Programming, volume 3, section 6.4).
+fn recent_place(number: u32) -> usize {
+    (number.wrapping_mul(0x9e37_79b9) >> (u32::BITS - RECENT_LOG2)) as usize
 }
 
-impl Part {
-    fn bytes(&self) -> usize {
-        match self {
-            Part::Page(page) => page.bytes(),
-            Part::Attributes(attributes) => attributes.bytes(),
-        }
-    }
+/// A part of a file in memory.
+pub(crate) trait Paged: Send + Sync + 'static {
+    /// Bytes that it takes.
+    fn bytes(&self) -> usize;
 }
 
 /// A place for a page.
-#[derive(Default)]
-struct Slot {
-    page: Mutex<Option<Arc<Part>>>,
+struct Slot<P> {
+    page: Mutex<Option<Arc<P>>>,
     /// Whether it was used since it was looked at last.
     used: AtomicBool,
 }
 
-/// The pages of one mesh.
-pub(super) struct PageCache {
-    /// Different for any two meshes of a process.
+/// The pages of one file.
+pub(crate) struct PageCache<P> {
+    /// Different for any two caches of a process.
     key: u64,
-    slots: Vec<Slot>,
+    slots: Vec<Slot<P>>,
     /// The pages that are in memory.
     queue: Mutex<VecDeque<u32>>,
     budget: usize,
@@ -58,7 +55,7 @@ pub(super) struct PageCache {
     reads: AtomicU64,
 }
 
-/// What the pages of a mesh take.
+/// What the pages of a file take.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct PageUse {
@@ -75,11 +72,13 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-impl PageCache {
-    pub(super) fn new(key: u64, pages: usize, budget: usize) -> PageCache {
+impl<P: Paged> PageCache<P> {
+    pub(crate) fn new(pages: usize, budget: usize) -> PageCache<P> {
+        static KEYS: AtomicU64 = AtomicU64::new(0);
+        let slot = || Slot { page: Mutex::new(None), used: AtomicBool::new(false) };
         PageCache {
-            key,
-            slots: (0..pages).map(|_| Slot::default()).collect(),
+            key: KEYS.fetch_add(1, Ordering::Relaxed),
+            slots: (0..pages).map(|_| slot()).collect(),
             queue: Mutex::new(VecDeque::new()),
             budget,
             bytes: AtomicUsize::new(0),
@@ -88,7 +87,7 @@ impl PageCache {
         }
     }
 
-    pub(super) fn page_use(&self) -> PageUse {
+    pub(crate) fn page_use(&self) -> PageUse {
         PageUse {
             bytes: self.bytes.load(Ordering::Relaxed),
             peak: self.peak.load(Ordering::Relaxed),
@@ -98,29 +97,32 @@ impl PageCache {
 
     /// Calls `work` with page `number`, which `read` reads where it is not in memory. `None` when
     /// it cannot be read.
-    pub(super) fn with<R>(
+    pub(crate) fn with<R>(
         &self,
         number: u32,
-        read: impl FnOnce() -> Option<Part>,
-        work: impl FnOnce(&Part) -> R,
+        read: impl FnOnce() -> Option<P>,
+        work: impl FnOnce(&P) -> R,
     ) -> Option<R> {
-        let recent = RECENTLY_USED.with_borrow(|pages| match &pages[number as usize % RECENT] {
+        let place = recent_place(number);
+        let recent = RECENTLY_USED.with_borrow(|pages| match &pages[place] {
             Some((key, page, held)) if (*key, *page) == (self.key, number) => Some(held.clone()),
             _ => None,
         });
-        let page = match recent {
+        let page = match recent.and_then(|held| held.downcast().ok()) {
             Some(page) => page,
             None => {
                 let page = self.page(number, read)?;
-                let held = Some((self.key, number, page.clone()));
-                RECENTLY_USED.with_borrow_mut(|pages| pages[number as usize % RECENT] = held);
+                let held: RecentPage = Some((self.key, number, page.clone()));
+                // The page that was there is dropped after the borrow: that may take a while.
+                let _before = RECENTLY_USED
+                    .with_borrow_mut(|pages| std::mem::replace(&mut pages[place], held));
                 page
             }
         };
         Some(work(&page))
     }
 
-    fn page(&self, number: u32, read: impl FnOnce() -> Option<Part>) -> Option<Arc<Part>> {
+    fn page(&self, number: u32, read: impl FnOnce() -> Option<P>) -> Option<Arc<P>> {
         let slot = self.slots.get(number as usize)?;
         slot.used.store(true, Ordering::Relaxed);
         let mut held = lock(&slot.page);
