@@ -87,6 +87,11 @@ impl MeshCache {
             .map(MeshCache::at)
     }
 
+    /// Where the files are.
+    pub fn directory(&self) -> &Path {
+        &self.directory
+    }
+
     /// The file of a key.
     pub fn path(&self, key: &str) -> PathBuf {
         let safe = |c: char| if c.is_ascii_alphanumeric() || "-_.".contains(c) { c } else { '_' };

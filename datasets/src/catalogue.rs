@@ -28,7 +28,7 @@ use rt_core::mesh::TriMesh;
 use std::cell::Cell;
 
 /// Seed of all data sets of the catalogue; the generators accept any.
-const SEED: u64 = 1;
+pub const SEED: u64 = 1;
 
 /// A named data set.
 #[derive(Debug)]

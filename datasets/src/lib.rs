@@ -9,7 +9,7 @@
 //! | [`image_io`] | images as PNG and multi-layer OpenEXR |
 //! | [`colormaps`], [`view`] | colours and cameras |
 //! | [`resample`] | data of any mesh on a uniform lattice, with a mask and the error |
-//! | [`stored_mesh`] | meshes in files that are larger than memory |
+//! | [`stored_mesh`], [`stored_volume`] | meshes and volumes in files that are larger than memory |
 //! | [`model`], [`read`], [`write`](mod@write) | data sets in files |
 //! | `cli` (feature) | conventions of all command-line programs of the workspace |
 #![forbid(unsafe_code)]
@@ -25,10 +25,13 @@ pub mod generate;
 pub mod image_io;
 pub mod isosurface;
 pub mod model;
+mod paged_file;
 pub mod read;
 pub mod resample;
 mod rows;
+pub use paged_file::PagedFile;
 pub mod stored_mesh;
+pub mod stored_volume;
 #[cfg(test)]
 mod testing;
 pub mod view;

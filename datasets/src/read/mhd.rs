@@ -3,7 +3,7 @@
 //! Source: the MetaIO documentation at itk.org/Wiki/MetaIO/Documentation.
 
 use super::error::{At, BROKEN, Cursor, Fault, read_bytes, sibling_path};
-use super::volume::{Packing, Volume};
+use super::volume::{Packing, ValuesPlace, Volume, start_of_file};
 use super::{Content, LoadedFile, OpenOptions, ReadError};
 use crate::model::{Endian, ScalarType};
 use glam::{DMat3, DVec3};
@@ -39,22 +39,12 @@ pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadErro
     let mut warnings = Vec::new();
     let (header, body) = Header::parse(bytes).map_err(fault)?;
     let volume = header.volume(path).map_err(fault)?;
-    let packing = if header.flag("CompressedData") { Packing::Deflate } else { Packing::Raw };
-    let packing = if header.flag("BinaryData") || header.get("BinaryData").is_none() {
-        packing
-    } else {
-        Packing::Text
-    };
-    let name = header.need("ElementDataFile").map_err(fault)?;
+    let (packing, name) = (header.packing(), header.data_file().map_err(fault)?);
     let read = |data: &[u8], warnings: &mut Vec<String>| {
         header.skip(data, &volume).and_then(|d| volume.clone().read(d, packing, warnings))
     };
     let data = if name.eq_ignore_ascii_case("LOCAL") {
         read(body, &mut warnings).map_err(fault)?
-    } else if name.starts_with("LIST") || name.contains('%') {
-        let what = format!("ElementDataFile = {name}: several data files");
-        let cure = "write it again as one file";
-        return Err(fault(Fault::unsupported(At::Field("ElementDataFile".into()), what, cure)));
     } else {
         let file = sibling_path(path, name);
         read(&read_bytes(&file)?, &mut warnings).map_err(|f| f.in_file(&file, FORMAT))?
@@ -65,6 +55,25 @@ pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadErro
         warnings,
         time_steps: Vec::new(),
     })
+}
+
+/// Where the values are.
+pub(super) fn place_of_values(path: &Path) -> Result<Option<ValuesPlace>, ReadError> {
+    let fault = |f: Fault| f.in_file(path, FORMAT);
+    let start = start_of_file(path)?;
+    let (header, body) = Header::parse(&start).map_err(fault)?;
+    let volume = header.volume(path).map_err(fault)?;
+    let (packing, name) = (header.packing(), header.data_file().map_err(fault)?);
+    let (file, before) = if name.eq_ignore_ascii_case("LOCAL") {
+        (path.to_path_buf(), (start.len() - body.len()) as u64)
+    } else {
+        (sibling_path(path, name), 0)
+    };
+    let skip = match header.bytes_to_skip().map_err(fault)? {
+        -1 if packing == Packing::Raw => None,
+        bytes => Some(before.saturating_add(bytes.max(0) as u64)),
+    };
+    Ok(Some(ValuesPlace { volume, packing, file, skip, format: FORMAT }))
 }
 
 struct Header {
@@ -118,9 +127,33 @@ impl Header {
         })
     }
 
+    fn packing(&self) -> Packing {
+        let is_text = self.get("BinaryData").is_some() && !self.flag("BinaryData");
+        match self.flag("CompressedData") {
+            _ if is_text => Packing::Text,
+            true => Packing::Deflate,
+            false => Packing::Raw,
+        }
+    }
+
+    /// The file with the values, or `LOCAL`.
+    fn data_file(&self) -> Result<&str, Fault> {
+        let name = self.need("ElementDataFile")?;
+        if name.starts_with("LIST") || name.contains('%') {
+            let what = format!("ElementDataFile = {name}: several data files");
+            let cure = "write it again as one file";
+            return Err(Fault::unsupported(At::Field("ElementDataFile".into()), what, cure));
+        }
+        Ok(name)
+    }
+
+    fn bytes_to_skip(&self) -> Result<i64, Fault> {
+        Ok(self.numbers::<i64>("HeaderSize")?.and_then(|v| v.first().copied()).unwrap_or(0))
+    }
+
     /// Skips HeaderSize bytes; -1 means that the values are at the end of the file.
     fn skip<'a>(&self, data: &'a [u8], volume: &Volume) -> Result<&'a [u8], Fault> {
-        let skip = self.numbers::<i64>("HeaderSize")?.and_then(|v| v.first().copied()).unwrap_or(0);
+        let skip = self.bytes_to_skip()?;
         if skip == -1 {
             let size = volume.count()?.saturating_mul(volume.kind.size() as u64);
             let size = super::error::fits(size, 1, data.len(), At::Byte(0), "bytes of values")?;

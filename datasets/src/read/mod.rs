@@ -35,6 +35,7 @@ pub mod stl_pieces;
 mod tecplot;
 pub(crate) mod time_axis;
 pub(crate) mod volume;
+pub mod volume_planes;
 pub mod vtk_legacy;
 pub mod vtk_xml;
 pub(crate) mod vtkhdf;

@@ -4,7 +4,7 @@
 //! Source: the definition of the format at teem.sourceforge.net/nrrd/format.html.
 
 use super::error::{At, BROKEN, Cursor, Fault, read_bytes, sibling_path};
-use super::volume::{Packing, Volume};
+use super::volume::{Packing, ValuesPlace, Volume, start_of_file};
 use super::{Content, LoadedFile, OpenOptions, ReadError};
 use crate::model::{Endian, ScalarType};
 use glam::{DMat3, DVec3};
@@ -40,18 +40,12 @@ pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadErro
     let (header, body) = Header::parse(bytes).map_err(fault)?;
     let volume = header.volume(path, &mut warnings).map_err(fault)?;
     let packing = header.packing().map_err(fault)?;
-    let detached = header.get(&["data file", "datafile"]);
-    let data = match detached {
+    let data = match header.data_file().map_err(fault)? {
         None => header
             .skip(body, &volume, packing)
             .and_then(|d| volume.clone().read(d, packing, &mut warnings))
             .map_err(fault)?,
         Some(name) => {
-            if name.starts_with("LIST") || name.contains('%') {
-                let what = format!("data file `{name}`: several data files");
-                let cure = "join them into one file, for example with `unu join` or `unu save`";
-                return Err(fault(Fault::unsupported(At::Field("data file".into()), what, cure)));
-            }
             let file = sibling_path(path, name);
             let bytes = read_bytes(&file)?;
             let read = header
@@ -66,6 +60,27 @@ pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadErro
         warnings,
         time_steps: Vec::new(),
     })
+}
+
+/// Where the values are; `None` where lines must be skipped to find them.
+pub(super) fn place_of_values(path: &Path) -> Result<Option<ValuesPlace>, ReadError> {
+    let fault = |f: Fault| f.in_file(path, FORMAT);
+    let start = start_of_file(path)?;
+    let (header, body) = Header::parse(&start).map_err(fault)?;
+    let volume = header.volume(path, &mut Vec::new()).map_err(fault)?;
+    let packing = header.packing().map_err(fault)?;
+    let (file, before) = match header.data_file().map_err(fault)? {
+        None => (path.to_path_buf(), (start.len() - body.len()) as u64),
+        Some(name) => (sibling_path(path, name), 0),
+    };
+    if header.number(&["line skip", "lineskip"]).map_err(fault)? > 0 {
+        return Ok(None);
+    }
+    let skip = match header.number(&["byte skip", "byteskip"]).map_err(fault)? {
+        -1 if packing == Packing::Raw => None,
+        bytes => Some(before.saturating_add(bytes.max(0) as u64)),
+    };
+    Ok(Some(ValuesPlace { volume, packing, file, skip, format: FORMAT }))
 }
 
 struct Header {
@@ -115,6 +130,25 @@ impl Header {
         self.get(&[name]).ok_or_else(|| Fault::field(format!("field `{name}`"), "it is missing"))
     }
 
+    /// The file with the values, if it is another one.
+    fn data_file(&self) -> Result<Option<&str>, Fault> {
+        let name = self.get(&["data file", "datafile"]);
+        if let Some(name) = name.filter(|name| name.starts_with("LIST") || name.contains('%')) {
+            let what = format!("data file `{name}`: several data files");
+            let cure = "join them into one file, for example with `unu join` or `unu save`";
+            return Err(Fault::unsupported(At::Field("data file".into()), what, cure));
+        }
+        Ok(name)
+    }
+
+    /// A whole number; 0 where the field is missing.
+    fn number(&self, names: &[&str]) -> Result<i64, Fault> {
+        let Some(text) = self.get(names) else { return Ok(0) };
+        text.parse().map_err(|_| {
+            Fault::field(format!("field `{}`", names[0]), format!("`{text}` is not a number"))
+        })
+    }
+
     fn packing(&self) -> Result<Packing, Fault> {
         match self.need("encoding")?.to_ascii_lowercase().as_str() {
             "raw" => Ok(Packing::Raw),
@@ -140,19 +174,13 @@ impl Header {
         volume: &Volume,
         packing: Packing,
     ) -> Result<&'a [u8], Fault> {
-        let number = |names: &[&str]| -> Result<i64, Fault> {
-            let Some(text) = self.get(names) else { return Ok(0) };
-            text.parse().map_err(|_| {
-                Fault::field(format!("field `{}`", names[0]), format!("`{text}` is not a number"))
-            })
-        };
         let mut cursor = Cursor::new(data);
-        for _ in 0..number(&["line skip", "lineskip"])?.max(0) {
+        for _ in 0..self.number(&["line skip", "lineskip"])?.max(0) {
             if cursor.line().is_none() {
                 break;
             }
         }
-        let bytes = number(&["byte skip", "byteskip"])?;
+        let bytes = self.number(&["byte skip", "byteskip"])?;
         if bytes == -1 && packing == Packing::Raw {
             let size = volume.count()?.saturating_mul(volume.kind.size() as u64);
             let size = super::error::fits(size, 1, data.len(), At::Byte(0), "bytes of values")?;

@@ -17,7 +17,7 @@
 //! parsed.
 
 use super::error::{At, BROKEN, Fault, io_error, read_bytes};
-use super::volume::Volume;
+use super::volume::{Packing, ValuesPlace, Volume};
 use super::{Content, LoadedFile, OpenOptions, ReadError};
 use crate::model::{Endian, ScalarType};
 use glam::{DMat3, DVec3};
@@ -84,6 +84,20 @@ pub(super) fn read_with(path: &Path, options: &OpenOptions) -> Result<LoadedFile
 
 /// Reads a raw volume; `path` is the file with the numbers or its description.
 pub fn read(path: &Path) -> Result<LoadedFile, ReadError> {
+    let (file, description) = described(path)?;
+    read_values(&file, &description)
+}
+
+/// Where the values are; `path` is as for [`read`].
+pub(super) fn place_of_values(path: &Path) -> Result<ValuesPlace, ReadError> {
+    let (file, description) = described(path)?;
+    let volume = description.volume(&file).map_err(|f| f.in_file(&file, FORMAT))?;
+    let skip = Some(description.skip_bytes);
+    Ok(ValuesPlace { volume, packing: Packing::Raw, file, skip, format: FORMAT })
+}
+
+/// The file with the numbers and its description.
+fn described(path: &Path) -> Result<(PathBuf, RawDescription), ReadError> {
     let is_description = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
     let description_path =
         if is_description { Some(path.to_path_buf()) } else { sibling_description(path) };
@@ -102,7 +116,7 @@ pub fn read(path: &Path) -> Result<LoadedFile, ReadError> {
             );
             return Err(fault.in_file(path, FORMAT));
         };
-        return read_values(path, &description);
+        return Ok((path.to_path_buf(), description));
     };
     let text = String::from_utf8_lossy(&read_bytes(&description_path)?).into_owned();
     let description = parse_description(&text).map_err(|f| f.in_file(&description_path, FORMAT))?;
@@ -111,7 +125,29 @@ pub fn read(path: &Path) -> Result<LoadedFile, ReadError> {
         None if is_description => path.with_extension("raw"),
         None => path.to_path_buf(),
     };
-    read_values(&file, &description)
+    Ok((file, description))
+}
+
+impl RawDescription {
+    /// Everything but the numbers, which are in `file`.
+    fn volume(&self, file: &Path) -> Result<Volume, Fault> {
+        let Some(kind) = scalar_type(&self.scalar_type) else {
+            let what = format!("`{}`", self.scalar_type);
+            let cure = "use one of i8 u8 i16 u16 i32 u32 i64 u64 f32 f64";
+            return Err(Fault::new(At::Field("`type` of the description".into()), what, cure));
+        };
+        let stem = || file.file_stem().map(|s| s.to_string_lossy().into_owned());
+        Ok(Volume {
+            name: self.name.clone().or_else(stem).unwrap_or_else(|| "values".into()),
+            dims: self.dims,
+            components: self.components,
+            kind,
+            endian: if self.endian == ByteOrder::Big { Endian::Big } else { Endian::Little },
+            origin: DVec3::from_array(self.origin),
+            spacing: DVec3::from_array(self.spacing),
+            direction: DMat3::IDENTITY,
+        })
+    }
 }
 
 /// Parses a description in TOML.
@@ -161,22 +197,7 @@ pub fn from_file_name(name: &str) -> Option<RawDescription> {
 
 fn read_values(path: &Path, d: &RawDescription) -> Result<LoadedFile, ReadError> {
     let fault = |f: Fault| f.in_file(path, FORMAT);
-    let Some(kind) = scalar_type(&d.scalar_type) else {
-        let what = format!("`{}`", d.scalar_type);
-        let cure = "use one of i8 u8 i16 u16 i32 u32 i64 u64 f32 f64";
-        return Err(fault(Fault::new(At::Field("`type` of the description".into()), what, cure)));
-    };
-    let stem = || path.file_stem().map(|s| s.to_string_lossy().into_owned());
-    let volume = Volume {
-        name: d.name.clone().or_else(stem).unwrap_or_else(|| "values".into()),
-        dims: d.dims,
-        components: d.components,
-        kind,
-        endian: if d.endian == ByteOrder::Big { Endian::Big } else { Endian::Little },
-        origin: DVec3::from_array(d.origin),
-        spacing: DVec3::from_array(d.spacing),
-        direction: DMat3::IDENTITY,
-    };
+    let volume = d.volume(path).map_err(fault)?;
     let mut file = std::fs::File::open(path).map_err(|e| io_error(path, e))?;
     let length = file.metadata().map_err(|e| io_error(path, e))?.len();
     let Some(available) = length.checked_sub(d.skip_bytes) else {
@@ -188,7 +209,8 @@ fn read_values(path: &Path, d: &RawDescription) -> Result<LoadedFile, ReadError>
         )));
     };
     file.seek(SeekFrom::Start(d.skip_bytes)).map_err(|e| io_error(path, e))?;
-    let want = volume.count().map_err(fault)?.saturating_mul(kind.size() as u64);
+    let size = volume.kind.size() as u64;
+    let want = volume.count().map_err(fault)?.saturating_mul(size);
     let mut warnings = Vec::new();
     if want < available {
         warnings.push(format!(

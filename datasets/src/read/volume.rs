@@ -1,9 +1,12 @@
 //! Code shared by the simple volume formats (NRRD, MetaImage, raw).
 
-use super::error::{At, BROKEN, Cursor, Fault, TRUNCATED};
+use super::ReadError;
+use super::error::{At, BROKEN, Cursor, Fault, TRUNCATED, io_error};
 use crate::model::{DataArray, Dataset, Endian, ImageData, ScalarType, Values};
 use glam::{DMat3, DVec3};
+use std::fs::File;
 use std::io::Read;
+use std::path::{Path, PathBuf};
 
 /// Everything about a volume but its numbers.
 #[derive(Debug, Clone)]
@@ -25,6 +28,28 @@ pub(crate) enum Packing {
     /// With a gzip or zlib wrapper.
     Deflate,
     Text,
+}
+
+/// Most bytes of a file that may be a header.
+const HEADER_BYTES: u64 = 1 << 20;
+
+/// Where the values of a volume are.
+pub(super) struct ValuesPlace {
+    pub(super) volume: Volume,
+    pub(super) packing: Packing,
+    /// The file with the values.
+    pub(super) file: PathBuf,
+    /// Bytes before them; `None` where they are at the end of the file.
+    pub(super) skip: Option<u64>,
+    pub(super) format: &'static str,
+}
+
+/// The first bytes of a file: its header, and perhaps values.
+pub(super) fn start_of_file(path: &Path) -> Result<Vec<u8>, ReadError> {
+    let mut start = Vec::new();
+    let file = File::open(path).map_err(|e| io_error(path, e))?;
+    file.take(HEADER_BYTES).read_to_end(&mut start).map_err(|e| io_error(path, e))?;
+    Ok(start)
 }
 
 impl Volume {
@@ -118,14 +143,20 @@ impl Volume {
     }
 }
 
+/// A fault where `compressed` bytes of gzip or zlib data cannot give `want` bytes.
+pub(super) fn check_inflation(want: u64, compressed: u64) -> Result<(), Fault> {
+    // Deflate gains at most 1:1032 (zlib's technical notes).
+    if want <= compressed.saturating_mul(1040) {
+        return Ok(());
+    }
+    let what = format!("{want} bytes cannot come from {compressed} compressed ones");
+    Err(Fault::new(At::Field("the compressed values".into()), what, BROKEN))
+}
+
 /// Unpacks gzip or zlib data that should give `want` bytes; more are not unpacked.
 fn inflate(data: &[u8], want: u64) -> Result<Vec<u8>, Fault> {
     let at = || At::Field("the compressed values".into());
-    // Deflate gains at most 1:1032 (zlib's technical notes).
-    if want > (data.len() as u64).saturating_mul(1040) {
-        let what = format!("{want} bytes cannot come from {} compressed ones", data.len());
-        return Err(Fault::new(at(), what, BROKEN));
-    }
+    check_inflation(want, data.len() as u64)?;
     let mut out = Vec::new();
     let result = if data.starts_with(&[0x1f, 0x8b]) {
         flate2::read::MultiGzDecoder::new(data).take(want).read_to_end(&mut out)
