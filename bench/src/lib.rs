@@ -32,3 +32,4 @@ pub mod report;
 pub mod rt_core_tracer;
 pub mod runner;
 pub mod stats;
+pub mod stored_data;

@@ -363,3 +363,69 @@ fn pieces_of_stl_ply_and_parallel_files_are_stored_one_after_the_other() {
     assert_eq!(said["triangles"], 2560);
     assert!(said["attribute_bytes"].as_u64().unwrap() > 0, "{said}");
 }
+
+#[test]
+fn a_stored_volume_has_the_picture_of_the_lattice_in_memory_and_refuses_the_rest() {
+    let dir = tempfile::tempdir().unwrap();
+    let of = |name: &str| dir.path().join(name).display().to_string();
+    files(dir.path());
+    // 40 x 36 x 34 bytes, and the same in single precision in a file that is read as a whole.
+    let (dims, raw, vti) = ([40, 36, 34], of("waves_40x36x34_uint8.raw"), of("waves.vti"));
+    let at = |i: u32| [i % 40, i / 40 % 36, i / 40 / 36].map(|x| 0.2 * f64::from(x));
+    let wave = |[x, y, z]: [f64; 3]| 128.0 + 40.0 * (x.sin() + y.cos() + (z + x).sin());
+    let values: Vec<u8> = (0..dims.iter().product()).map(|i| wave(at(i)) as u8).collect();
+    std::fs::write(&raw, &values).unwrap();
+    let mut image = ImageData::new(dims, DVec3::ZERO, DVec3::ONE);
+    let floats = values.iter().map(|v| f32::from(*v)).collect();
+    image.attributes.point.push(DataArray::new("waves", 1, Values::F32(floats)));
+    write_vtk(Path::new(&vti), &Dataset::ImageData(image), VtkOptions::default()).unwrap();
+
+    let (stored, png) = (of("waves.rtvolume"), of("picture.png"));
+    let camera = of("camera.toml");
+    std::fs::write(&camera, "eye = [80.0, -40.0, 60.0]\ntarget = [20.0, 18.0, 17.0]\n").unwrap();
+    let pixels = |file: &str| {
+        let options = ["--isovalue", "150.5", "--effects", "shadows", "--camera", camera.as_str()];
+        let size = ["--size", "96x96", "--samples", "1", "--json"];
+        let drawn = bench(&[&["render", file, "-o", &png], &options[..], &size].concat());
+        assert!(drawn.status.success(), "{}", String::from_utf8_lossy(&drawn.stderr));
+        let said: Value = serde_json::from_slice(&drawn.stdout).unwrap();
+        (read_png(Path::new(&png)).unwrap().rgba().unwrap(), said)
+    };
+    let (expected, _) = pixels(&raw);
+    assert!(expected.iter().filter(|c| **c != expected[0]).count() > 1500);
+    for (file, least, most) in [(&raw, 1.0, 1.4), (&vti, 4.0, 5.0)] {
+        let made = bench(&["store", file, "-o", &stored, "--json"]);
+        assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+        let said: Value = serde_json::from_slice(&made.stdout).unwrap();
+        assert_eq!((said["points"].as_u64(), said["bricks"].as_u64()), (Some(48_960), Some(8)));
+        let bytes_a_point = said["bytes"].as_f64().unwrap() / 48_960.0;
+        assert!((least..most).contains(&bytes_a_point), "{bytes_a_point}");
+        let (found, said) = pixels(&stored);
+        assert!(found == expected, "{file}");
+        assert_eq!(said["format"], "stored volume");
+        assert!(said["stored"]["page_reads"].as_u64().unwrap() >= 1, "{said}");
+    }
+
+    let refused = |args: &[&str], words: [&str; 2]| {
+        let out = bench(args);
+        let text = String::from_utf8_lossy(&out.stderr).into_owned();
+        assert!(matches!(out.status.code(), Some(1 | 2)), "{args:?}: {text}");
+        assert!(words.iter().all(|word| text.contains(word)), "{args:?}: {text}");
+    };
+    let render = ["render", stored.as_str(), "-o", png.as_str()];
+    refused(&[&render[..], &["--isovalue", "300"]].concat(), ["300", "choose --isovalue"]);
+    refused(&[&render[..], &["--color-by", "waves"]].concat(), ["--color-by", "leave it out"]);
+    refused(&[&render[..], &["--effects", "volumes"]].concat(), ["volumes", "leave it out"]);
+    let store = ["store", raw.as_str(), "-o", stored.as_str()];
+    refused(&[&store[..], &["--isovalue", "3"]].concat(), ["--isovalue", "belongs to meshes"]);
+    refused(&[&store[..], &["--memory", "3"]].concat(), ["--memory", "belongs to meshes"]);
+    refused(&[&store[..], &["--array", "other"]].concat(), ["`other`", "`waves`"]);
+    let mesh = of("waves.rtmesh");
+    refused(&["store", &vti, "-o", &mesh, "--array", "waves"], ["--array", "belongs to volumes"]);
+    refused(&["store", &of("ball.vtp"), "-o", &stored], ["cannot be stored as a volume", "mesh"]);
+    let layer = ["store", "--mixing-layer", "48", "-o"];
+    refused(&[&layer[..], &[&mesh]].concat(), ["--mixing-layer", "belongs to volumes"]);
+    let made = bench(&[&layer[..], &[&stored, "--json"]].concat());
+    let said: Value = serde_json::from_slice(&made.stdout).unwrap();
+    assert_eq!(said["dims"], serde_json::json!([48, 48, 45]));
+}

@@ -1,6 +1,6 @@
 //! Messages with random changes: each run ends with the right image or with named errors on all
-//! ranks, never with a panic. The seeds are fixed and time is virtual: every run of this test is the
-//! same, on a busy machine too.
+//! ranks, never with a panic. The seeds are fixed and time is virtual: every run of this test is
+//! the same, on a busy machine too.
 mod meddling;
 #[path = "meddling/mutation.rs"]
 mod mutation;

@@ -1,6 +1,6 @@
 //! `bench render` and `bench picture`.
 
-use super::{ImageArgs, RenderArgs, stored_mesh};
+use super::{ImageArgs, RenderArgs, stored_file};
 use crate::image::framing::{Framing, read_camera};
 use crate::image::style::{BACKGROUNDS, RenderStyle};
 use crate::image::subject::{LoadOptions, Subject, VolumeChoice};
@@ -42,7 +42,7 @@ pub(super) fn render(common: CommonArgs, args: &RenderArgs) -> anyhow::Result<()
         volume,
         origin: None,
     };
-    let stored = stored_mesh::open(args, &load_options)?;
+    let stored = stored_file::open(args, &load_options)?;
     let cure = if load_options.volume == VolumeChoice::No {
         "look at the file with the options --color-by and --isovalue in mind, or convert it to \
          .vtp or .vti with ParaView"
@@ -52,7 +52,7 @@ pub(super) fn render(common: CommonArgs, args: &RenderArgs) -> anyhow::Result<()
          --volume names one of its arrays"
     };
     let (subject, format) = match &stored {
-        Some(mesh) => (Subject::from_stored(mesh), "stored mesh"),
+        Some(stored) => (stored.subject(args, &load_options)?, stored.format()),
         None => {
             let opened = datasets::read::open(&args.file)?;
             let subject = Subject::from_file(&opened, &load_options)
@@ -63,8 +63,7 @@ pub(super) fn render(common: CommonArgs, args: &RenderArgs) -> anyhow::Result<()
     };
     let read_secs = start.elapsed().as_secs_f64();
     cancel.check()?;
-    let triangles =
-        stored.as_ref().map_or(subject.triangles() as u64, |mesh| mesh.report().triangles);
+    let triangles = stored.as_ref().map_or(subject.triangles() as u64, |s| s.triangles());
     let contents = subject.contents.clone();
     let scalar_range = args.range.or(subject.scalar_range);
     let mut warnings = subject.warnings.clone();
@@ -116,7 +115,7 @@ pub(super) fn render(common: CommonArgs, args: &RenderArgs) -> anyhow::Result<()
         "quality": args.quality.name(),
         "storage": args.storage.name(),
         "rays": rays(&rendered.report.rays),
-        "stored": stored.as_deref().map(stored_mesh::page_use),
+        "stored": stored.as_ref().map(|s| s.page_use()),
         "seconds": { "read": read_secs, "build": rendered.build_secs, "render": rendered.render_secs },
         "warnings": warnings,
         "output": png,

@@ -4,7 +4,7 @@ use super::mesh_file::read_mesh;
 use super::report::write_page;
 use super::{RunArgs, default_dir};
 use crate::doubts::{Admission, Gate};
-use crate::experiments::{self, Context, Experiment, Outcome};
+use crate::experiments::{self, Context, Experiment, Outcome, WITH_THESIS_SIZES};
 use crate::machine::Machine;
 use crate::record::Record;
 use datasets::cli::{Cancel, CommonArgs, Interrupted, ProgressBar, UsageError};
@@ -20,6 +20,13 @@ pub(super) fn run(common: CommonArgs, args: &RunArgs) -> anyhow::Result<()> {
         let text = format!("--mesh {file} is for `peers`; `{id}` has data of its own, omit --mesh");
         return Err(UsageError(text).into());
     }
+    if args.thesis
+        && let Some(other) = chosen.iter().find(|e| !WITH_THESIS_SIZES.contains(&e.id))
+    {
+        let (id, with) = (other.id, WITH_THESIS_SIZES.join(", "));
+        let text = format!("--thesis is for {with}; `{id}` has one full size, omit --thesis");
+        return Err(UsageError(text).into());
+    }
     if args.mesh.is_some() && (args.record || args.record_despite_doubts) {
         let text = "records in bench/runs are of meshes that anyone can make again; give --out DIR \
                     instead of --record to keep what --mesh measures";
@@ -33,6 +40,7 @@ pub(super) fn run(common: CommonArgs, args: &RunArgs) -> anyhow::Result<()> {
     let steps = Steps::new(common, cancel, chosen.len());
     let mut progress = |what: &str, share: Option<f64>| steps.next(what, share);
     let mut context = Context::new(args.quick, Some(cancel.flag().clone()), &mut progress);
+    context.thesis = args.thesis;
     context.mesh = args.mesh.as_deref().map(|file| read_mesh(common, file)).transpose()?;
     let mut written = false;
     for (i, experiment) in chosen.into_iter().enumerate() {

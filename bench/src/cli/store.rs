@@ -1,18 +1,17 @@
-//! `bench store`: writes meshes to files that are larger than memory.
+//! `bench store`: writes meshes to files that are larger than memory, and volumes
+//! ([`super::store_volume`]).
 
-use super::StoreArgs;
 use super::mesh_file::with_origin;
+use super::{StoreArgs, store_volume};
 use crate::image::subject::{LoadOptions, PartColoring, Subject};
+use crate::stored_data::wavelet_surfaces;
 use anyhow::Context as _;
 use datasets::cli::{Cancel, CommonArgs, CureExt as _, UsageError};
-use datasets::generate::nested_wavelet::{POINTS, isovalues_for};
-use datasets::generate::wavelet::Wavelet;
-use datasets::isosurface::{self, Options};
 use datasets::read::ply_pieces::PlyPieces;
 use datasets::read::stl_pieces::StlPieces;
 use datasets::read::vtk_xml::{PieceFiles, piece_files};
 use datasets::read::{Content, LoadedFile};
-use datasets::stored_mesh::{self, StoredMeshFile};
+use datasets::{PagedFile, stored_mesh};
 use rt_core::bvh::{Geometry, StoredMeshReport, StoredMeshWriter};
 use rt_core::glam::DVec3;
 use rt_core::mesh::{MeshSlices, TriMesh};
@@ -26,12 +25,32 @@ Examples:
   bench store surface.vtp -o surface.rtmesh
   bench store surface.vtp -o surface.rtmesh --color-by pressure --normal-tolerance 0.1
   bench store --wavelet 256 -o wavelet.rtmesh --memory 4096
-  bench render wavelet.rtmesh -o wavelet.png --memory 900";
+  bench render wavelet.rtmesh -o wavelet.png --memory 900
+  bench store ct.nrrd -o ct.rtvolume
+  bench render ct.rtvolume --isovalue 300 -o bone.png --memory 900
+  bench store --mixing-layer 2048 -o layer.rtvolume";
+
+/// Megabytes for small pieces, unless the user gives others.
+const DEFAULT_MEMORY: u64 = 1024;
 
 pub(super) fn store(common: CommonArgs, args: &StoreArgs) -> anyhow::Result<()> {
+    if store_volume::is_meant(&args.out) {
+        return store_volume::store(common, args);
+    }
+    let of_volumes =
+        [("--array", args.array.is_some()), ("--mixing-layer", args.mixing_layer.is_some())];
+    if let Some((option, _)) = of_volumes.iter().find(|(_, given)| *given) {
+        let shown = args.out.display();
+        return Err(UsageError(format!(
+            "{option} belongs to volumes, and {shown} is a mesh: leave it out, or write to \
+             FILE.rtvolume"
+        ))
+        .into());
+    }
     let cancel = Cancel::on_ctrl_c()?;
     let start = Instant::now();
-    let memory = usize::try_from(args.memory).unwrap_or(usize::MAX).saturating_mul(1 << 20);
+    let memory = args.memory.unwrap_or(DEFAULT_MEMORY);
+    let memory = usize::try_from(memory).unwrap_or(usize::MAX).saturating_mul(1 << 20);
     let report = match (&args.file, args.wavelet) {
         (Some(file), None) => store_file(common, args, file, memory, &cancel)?,
         (None, Some(millions)) => store_wavelet(common, args, millions, memory, &cancel)?,
@@ -132,7 +151,7 @@ struct StoreJob<'a> {
     memory: usize,
     cancel: &'a Cancel,
     /// Started by the first mesh, whose origin all positions are relative to.
-    writer: Option<(StoredMeshWriter<StoredMeshFile>, DVec3)>,
+    writer: Option<(StoredMeshWriter<PagedFile>, DVec3)>,
     /// What the user was told: pieces of a file are wanting in the same ways.
     warned: HashSet<String>,
     has_normals: bool,
@@ -241,8 +260,7 @@ impl<'a> StoreJob<'a> {
     }
 }
 
-/// Nested isosurfaces of the wavelet, one after the other: the dissertation's scaling series
-/// (section 4.3), which goes to 256 million triangles.
+/// See [`wavelet_surfaces`].
 fn store_wavelet(
     common: CommonArgs,
     args: &StoreArgs,
@@ -250,16 +268,16 @@ fn store_wavelet(
     memory: usize,
     cancel: &Cancel,
 ) -> anyhow::Result<StoredMeshReport> {
-    let grid = Wavelet::with_points(POINTS).grid()?;
-    let isovalues = isovalues_for(&grid, millions as usize * 1_000_000)?;
-    let options = Options { normals: !args.no_attributes, ..Options::default() };
+    /// Steps of the progress bar.
+    const PARTS: u64 = 1000;
     let mut job = StoreJob::new(common, args, memory, cancel);
-    let bar = common.progress(isovalues.len() as u64, "storing");
-    for (number, isovalue) in isovalues.iter().enumerate() {
-        let surface = isosurface::extract(&grid, &[*isovalue], options)
-            .cure("give --wavelet fewer millions")?;
+    let bar = common.progress(PARTS, "storing");
+    for surface in
+        wavelet_surfaces(millions, !args.no_attributes).cure("give --wavelet fewer millions")?
+    {
+        let surface = surface.cure("give --wavelet fewer millions")?;
         job.add(&surface.mesh)?;
-        bar.set_position(number as u64 + 1);
+        bar.set_position((surface.share * PARTS as f64) as u64);
     }
     job.finish(&args.out)
 }

@@ -1,48 +1,74 @@
-//! Stored meshes as the file of `bench render`.
+//! Files that `bench store` wrote as the file of `bench render`.
 
 use super::RenderArgs;
-use crate::image::subject::{LoadOptions, VolumeChoice};
+use crate::image::subject::{LoadOptions, Subject, VolumeChoice};
+use anyhow::Context as _;
 use datasets::cli::UsageError;
-use rt_core::bvh::{Robustness, Storage, StoredMesh};
+use rt_core::bvh::{PageUse, Robustness, Storage, StoredMesh};
+use rt_core::stored_volume::StoredVolume;
 use serde_json::{Value, json};
 use std::io::Read as _;
+use std::path::Path;
 use std::sync::Arc;
 
-/// Megabytes for pages, unless the user gives others.
+/// Megabytes for pages or bricks, unless the user gives others.
 const DEFAULT_MEMORY: u64 = 1024;
 
-/// The file as a stored mesh, when it is one.
-pub(super) fn open(
-    args: &RenderArgs,
-    options: &LoadOptions,
-) -> anyhow::Result<Option<Arc<StoredMesh>>> {
+/// An open file.
+pub(super) enum StoredFile {
+    Mesh(Arc<StoredMesh>),
+    Volume(Arc<StoredVolume>),
+}
+
+/// Opens the file, when `bench store` wrote it.
+pub(super) fn open(args: &RenderArgs, options: &LoadOptions) -> anyhow::Result<Option<StoredFile>> {
     let mut start = [0; 8];
     // Folders and files that cannot be read are the readers' to report.
     let read = std::fs::File::open(&args.file).and_then(|mut file| file.read_exact(&mut start));
-    let file = args.file.display();
-    if read.is_err() || !StoredMesh::recognizes(&start) {
-        if args.memory.is_some() {
-            return Err(UsageError(format!(
-                "--memory belongs to a stored mesh, and {file} is none; leave it out, or make one \
-                 with `bench store {file} -o FILE.rtmesh`"
-            ))
-            .into());
-        }
-        return Ok(None);
+    let memory = args.memory.unwrap_or(DEFAULT_MEMORY);
+    let memory = usize::try_from(memory).unwrap_or(usize::MAX).saturating_mul(1 << 20);
+    if read.is_ok() && StoredMesh::recognizes(&start) {
+        return open_mesh(args, options, memory).map(|mesh| Some(StoredFile::Mesh(mesh)));
     }
+    if read.is_ok() && StoredVolume::recognizes(&start) {
+        return open_volume(args, options, memory).map(|volume| Some(StoredFile::Volume(volume)));
+    }
+    if args.memory.is_some() {
+        let file = args.file.display();
+        return Err(UsageError(format!(
+            "--memory belongs to a stored mesh or volume, and {file} is none; leave it out, or \
+             make one with `bench store {file} -o FILE.rtmesh` or, of image data, `-o \
+             FILE.rtvolume`"
+        ))
+        .into());
+    }
+    Ok(None)
+}
+
+/// Refuses the first option that is given and would change nothing.
+fn refuse_without_effect(
+    file: &Path,
+    options: &[(&str, bool)],
+    reason: &str,
+) -> Result<(), UsageError> {
+    let Some((option, _)) = options.iter().find(|(_, given)| *given) else { return Ok(()) };
+    Err(UsageError(format!("{option} has no effect on {}: {reason}; leave it out", file.display())))
+}
+
+fn open_mesh(
+    args: &RenderArgs,
+    options: &LoadOptions,
+    memory: usize,
+) -> anyhow::Result<Arc<StoredMesh>> {
     let without_effect = [
         ("--isovalue", options.isovalue.is_some()),
         ("--volume", options.volume != VolumeChoice::No),
         ("--storage", args.storage != Storage::Plain),
         ("--robustness", args.robustness != Robustness::Watertight),
     ];
-    if let Some((option, _)) = without_effect.iter().find(|(_, given)| *given) {
-        return Err(UsageError(format!(
-            "{option} has no effect on {file}: a stored mesh has triangles alone, compact and \
-             watertight; leave it out"
-        ))
-        .into());
-    }
+    let reason = "a stored mesh has triangles alone, compact and watertight";
+    refuse_without_effect(&args.file, &without_effect, reason)?;
+    let file = args.file.display();
     if options.color_by.is_some() {
         return Err(UsageError(format!(
             "--color-by has no effect on {file}: the array is chosen when a mesh is stored; leave \
@@ -50,8 +76,6 @@ pub(super) fn open(
         ))
         .into());
     }
-    let memory = args.memory.unwrap_or(DEFAULT_MEMORY);
-    let memory = usize::try_from(memory).unwrap_or(usize::MAX).saturating_mul(1 << 20);
     let mesh = datasets::stored_mesh::open(&args.file, memory)?;
     if args.range.is_some() && mesh.attributes().scalars.is_none() {
         return Err(UsageError(format!(
@@ -60,16 +84,75 @@ pub(super) fn open(
         ))
         .into());
     }
-    Ok(Some(Arc::new(mesh)))
+    Ok(Arc::new(mesh))
 }
 
-/// What was read of it, for the result in JSON.
-pub(super) fn page_use(mesh: &StoredMesh) -> Value {
-    let (report, pages) = (mesh.report(), mesh.page_use());
-    json!({
-        "pages": report.pages,
-        "bytes": report.bytes,
-        "page_reads": pages.reads,
-        "peak_bytes": pages.peak,
-    })
+fn open_volume(
+    args: &RenderArgs,
+    options: &LoadOptions,
+    memory: usize,
+) -> anyhow::Result<Arc<StoredVolume>> {
+    let without_effect = [
+        ("--volume, or the effect `volumes`,", options.volume != VolumeChoice::No),
+        ("--color-by", options.color_by.is_some()),
+        ("--range", args.range.is_some()),
+        ("--storage", args.storage != Storage::Plain),
+        ("--robustness", args.robustness != Robustness::Watertight),
+    ];
+    let reason = "a stored volume is drawn as an isosurface of one colour, without triangles";
+    refuse_without_effect(&args.file, &without_effect, reason)?;
+    Ok(Arc::new(datasets::stored_volume::open(&args.file, memory)?))
+}
+
+impl StoredFile {
+    /// What is drawn.
+    pub(super) fn subject(
+        &self,
+        args: &RenderArgs,
+        options: &LoadOptions,
+    ) -> anyhow::Result<Subject> {
+        match self {
+            StoredFile::Mesh(mesh) => Ok(Subject::from_stored_mesh(mesh)),
+            StoredFile::Volume(volume) => Subject::from_stored_volume(volume, options.isovalue)
+                .with_context(|| format!("{}: cannot be drawn so", args.file.display())),
+        }
+    }
+
+    /// Name of the format.
+    pub(super) fn format(&self) -> &'static str {
+        match self {
+            StoredFile::Mesh(_) => "stored mesh",
+            StoredFile::Volume(_) => "stored volume",
+        }
+    }
+
+    /// Triangles of a mesh.
+    pub(super) fn triangles(&self) -> u64 {
+        match self {
+            StoredFile::Mesh(mesh) => mesh.report().triangles,
+            StoredFile::Volume(_) => 0,
+        }
+    }
+
+    /// What was read of it, for the result in JSON.
+    pub(super) fn page_use(&self) -> Value {
+        let object = |pages: PageUse, number: u64, bytes: u64| {
+            json!({
+                "pages": number,
+                "bytes": bytes,
+                "page_reads": pages.reads,
+                "peak_bytes": pages.peak,
+            })
+        };
+        match self {
+            StoredFile::Mesh(mesh) => {
+                let report = mesh.report();
+                object(mesh.page_use(), report.pages, report.bytes)
+            }
+            StoredFile::Volume(volume) => {
+                let report = volume.report();
+                object(volume.page_use(), report.bricks, report.bytes)
+            }
+        }
+    }
 }

@@ -43,6 +43,7 @@ mod shock_angles;
 mod smpi;
 mod speed_gpu;
 mod speed_schlieren;
+mod stored_files;
 mod strong_scaling;
 mod table4_1;
 mod table5_1;
@@ -70,6 +71,9 @@ pub struct Experiment {
     pub title: &'static str,
     run: fn(&mut Context<'_>, &mut Record) -> anyhow::Result<()>,
 }
+
+/// The experiments that have the dissertation's own sizes ([`Context::thesis`]).
+pub const WITH_THESIS_SIZES: &[&str] = &["stored-files"];
 
 /// All experiments, in the order of the report.
 pub const ALL: &[Experiment] = &[
@@ -165,6 +169,12 @@ pub const ALL: &[Experiment] = &[
         title: "Replicated data against data in parts, 1 to 128 ranks; and processes that make a \
                 program’s image",
         run: fig4_10::run,
+    },
+    Experiment {
+        id: "stored-files",
+        chapter: 4,
+        title: "Data in files that may be larger than memory: preparing, opening and drawing them",
+        run: stored_files::run,
     },
     Experiment {
         id: "effects",
@@ -342,6 +352,8 @@ pub fn find(id: &str) -> Option<&'static Experiment> {
 pub struct Context<'a> {
     /// Smaller data and fewer rounds: each experiment takes less than a minute on two cores.
     pub quick: bool,
+    /// The dissertation's own sizes, where an experiment has them: hours, and files of gigabytes.
+    pub thesis: bool,
     /// Called with the next step and, where known, the completed fraction of the experiment. An
     /// error stops the experiment.
     pub progress: &'a mut Progress<'a>,
@@ -362,7 +374,7 @@ impl<'a> Context<'a> {
         cancel: Option<Arc<AtomicBool>>,
         progress: &'a mut Progress<'a>,
     ) -> Context<'a> {
-        Context { quick, progress, cancel, mesh: None, wavelets: BTreeMap::new() }
+        Context { quick, thesis: false, progress, cancel, mesh: None, wavelets: BTreeMap::new() }
     }
 
     fn report_step(&mut self, what: impl AsRef<str>) -> anyhow::Result<()> {
@@ -451,6 +463,7 @@ mod tests {
             assert_eq!(find(&e.id.to_uppercase()).map(|f| f.id), Some(e.id));
             assert!((3..=5).contains(&e.chapter) && !e.title.is_empty());
         }
+        assert!(WITH_THESIS_SIZES.iter().all(|id| find(id).is_some()));
         assert!(find("fig9.9").is_none());
     }
 }

@@ -14,6 +14,7 @@ use rt_core::mesh::{Attribute, TriMesh};
 use rt_core::shapes::{
     Isosurface, IsosurfaceNormals, IsosurfaceOptions, Radii, Shape, Spheres, Tubes,
 };
+use rt_core::stored_volume::{StoredIsosurface, StoredVolume};
 use std::sync::Arc;
 
 /// Where a part's colour comes from.
@@ -205,7 +206,7 @@ impl Subject {
     }
 
     /// The triangles of a file that is larger than memory.
-    pub fn from_stored(mesh: &Arc<StoredMesh>) -> Subject {
+    pub fn from_stored_mesh(mesh: &Arc<StoredMesh>) -> Subject {
         let mut subject = Subject::empty(DVec3::Z);
         let report = mesh.report();
         subject.contents.push(format!("{} stored triangles", report.triangles));
@@ -229,6 +230,41 @@ impl Subject {
         };
         subject.parts.push(Part::shape(mesh.clone(), coloring, outline));
         subject
+    }
+
+    /// An isosurface of a volume that is larger than memory; without an isovalue, that in the
+    /// middle of the range.
+    ///
+    /// # Errors
+    /// When there is no such surface.
+    pub fn from_stored_volume(
+        volume: &Arc<StoredVolume>,
+        isovalue: Option<f32>,
+    ) -> anyhow::Result<Subject> {
+        let mut subject = Subject::empty(DVec3::Z);
+        let isovalue = isovalue_in(volume.range(), isovalue)?;
+        let normals = IsosurfaceNormals::Smooth;
+        let surface = StoredIsosurface::new(volume.clone(), &[isovalue], normals)?;
+        let report = volume.report();
+        if report.non_finite > 0 {
+            subject.warnings.push(format!(
+                "{} values are not finite: the surface ends at the cells around them",
+                report.non_finite
+            ));
+        }
+        let (points, bricks) = (report.points, surface.num_primitives());
+        subject.contents.push(format!(
+            "isosurface at {isovalue} of {points} points, in {bricks} of {} stored bricks",
+            report.bricks
+        ));
+        // The corners of the bricks' boxes: those of the lattice would frame it too small.
+        let at = |corner: Vec3| surface.origin() + corner.as_dvec3();
+        let boxes = (0..bricks as u32).map(|brick| surface.bounds(brick));
+        let outline = boxes.filter(|b| !b.is_empty());
+        let outline = outline.flat_map(|b| corners_of_box(at(b.min), at(b.max))).collect();
+        let coloring = PartColoring::Color(DEFAULT_COLOR);
+        subject.parts.push(Part::shape(Arc::new(surface), coloring, outline));
+        Ok(subject)
     }
 
     fn extend_scalar_range(&mut self, scalars: &[f32]) {
@@ -349,6 +385,19 @@ fn lattice(
     }
 }
 
+/// The isovalue that was asked for, or that in the middle of the range of a field.
+fn isovalue_in(range: Option<(f32, f32)>, isovalue: Option<f32>) -> anyhow::Result<f32> {
+    let Some((lo, hi)) = range else {
+        anyhow::bail!("the field has no finite value: there is no isosurface to draw");
+    };
+    let iso = isovalue.unwrap_or(0.5 * lo + 0.5 * hi);
+    anyhow::ensure!(
+        lo < iso && iso <= hi,
+        "no isosurface at {iso}: the field ranges from {lo} to {hi}; choose --isovalue in between"
+    );
+    Ok(iso)
+}
+
 fn isosurface(
     mut subject: Subject,
     data: &Dataset,
@@ -367,14 +416,7 @@ fn isosurface(
         }
         _ => colors.clone(),
     };
-    let Some((lo, hi)) = field.range() else {
-        anyhow::bail!("the field has no finite value: there is no isosurface to draw");
-    };
-    let iso = load_options.isovalue.unwrap_or(0.5 * lo + 0.5 * hi);
-    anyhow::ensure!(
-        lo < iso && iso <= hi,
-        "no isosurface at {iso}: the field ranges from {lo} to {hi}; choose --isovalue in between"
-    );
+    let iso = isovalue_in(field.range(), load_options.isovalue)?;
     let options = IsosurfaceOptions { normals: IsosurfaceNormals::Smooth, ..Default::default() };
     let mut surface = Isosurface::new(field.clone(), &[iso], &options)?;
     let missing = surface.report().cells_non_finite;

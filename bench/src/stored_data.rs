@@ -1,0 +1,77 @@
+//! The dissertation's data in files that may be larger than memory.
+
+use datasets::catalogue::SEED;
+use datasets::cli::CureExt as _;
+use datasets::generate::mixing_layer::MixingLayer;
+use datasets::generate::nested_wavelet::{POINTS, isovalues_for};
+use datasets::generate::wavelet::Wavelet;
+use datasets::isosurface::{self, Options, PlaneSource as _};
+use datasets::stored_volume;
+use rayon::prelude::*;
+use rt_core::mesh::TriMesh;
+use rt_core::stored_volume::{StoredVolumeReport, ValueType, VolumeLayout};
+use std::path::Path;
+
+/// Planes of the mixing layer that are made before they are stored.
+const PLANES_AT_ONCE: u32 = 32;
+
+/// Stores the Richtmyer-Meshkov-like mixing layer in bytes, as the simulation was published: the
+/// fraction of the heavy gas times 255. `progress` gets the number of planes that are stored, and
+/// of all; an error of it ends the work.
+///
+/// # Errors
+/// Those of `progress`, and when the file cannot be written.
+pub fn store_mixing_layer(
+    path: &Path,
+    points: u32,
+    progress: &mut dyn FnMut(u32, u32) -> anyhow::Result<()>,
+) -> anyhow::Result<(VolumeLayout, StoredVolumeReport)> {
+    let layer = MixingLayer::new(points, SEED);
+    let (dims, origin, spacing) = (layer.dims(), layer.origin(), layer.spacing());
+    let layout = VolumeLayout { dims, origin, spacing, values: ValueType::U8 };
+    let mut writer = stored_volume::create(path, layout)?;
+    let in_bytes = |z: u32| -> Vec<u8> {
+        let mut plane = vec![0.0f32; dims.x as usize * dims.y as usize];
+        layer.fill_plane(z, &mut plane);
+        plane.iter().map(|v| (255.0 * v).round() as u8).collect()
+    };
+    for first in (0..dims.z).step_by(PLANES_AT_ONCE as usize) {
+        progress(first, dims.z)?;
+        let end = (first + PLANES_AT_ONCE).min(dims.z);
+        let planes: Vec<Vec<u8>> = (first..end).into_par_iter().map(in_bytes).collect();
+        planes.iter().try_for_each(|plane| writer.add_plane(plane))?;
+    }
+    Ok((layout, stored_volume::finish(writer)?))
+}
+
+/// One of the nested surfaces of the wavelet.
+pub struct WaveletSurface {
+    /// Its number among all, for people.
+    pub label: String,
+    /// Share of the surfaces with this one, 0..=1.
+    pub share: f64,
+    /// Its triangles.
+    pub mesh: TriMesh,
+}
+
+/// Nested isosurfaces of the wavelet, one after the other: the dissertation's scaling series
+/// (section 4.3), which goes to 256 million triangles.
+///
+/// # Errors
+/// When the wavelet cannot be made; each surface may have an error of its own.
+pub fn wavelet_surfaces(
+    millions: u32,
+    normals: bool,
+) -> anyhow::Result<impl Iterator<Item = anyhow::Result<WaveletSurface>>> {
+    let grid = Wavelet::with_points(POINTS).grid()?;
+    let isovalues = isovalues_for(&grid, millions as usize * 1_000_000)?;
+    let options = Options { normals, ..Options::default() };
+    let count = isovalues.len();
+    Ok(isovalues.into_iter().enumerate().map(move |(number, isovalue)| {
+        let surface = isosurface::extract(&grid, &[isovalue], options)
+            .cure("ask for fewer millions of triangles")?;
+        let (label, share) =
+            (format!("surface {} of {count}", number + 1), (number + 1) as f64 / count as f64);
+        Ok(WaveletSurface { label, share, mesh: surface.mesh })
+    }))
+}
