@@ -176,32 +176,39 @@ impl IndexRay {
             entry: (!starts_inside).then_some(entry),
             exit: None,
         };
+        // All three axes are computed and one is taken: an axis that is looked up by its number
+        // would keep the arrays in memory, and a branch on it cannot be predicted.
+        let forward: [bool; 3] = std::array::from_fn(|b| self.d[b] > 0.0);
         loop {
-            let a = if next[0] <= next[1] && next[0] <= next[2] {
-                0
+            let (a, leaves_at) = if next[0] <= next[1] && next[0] <= next[2] {
+                (0, next[0])
             } else if next[1] <= next[2] {
-                1
+                (1, next[1])
             } else {
-                2
+                (2, next[2])
             };
-            let ends_inside = next[a] > t_max;
-            crossing.t1 = if ends_inside { t_max } else { next[a].max(crossing.t0) };
+            let ends_inside = leaves_at > t_max;
+            crossing.t1 = if ends_inside { t_max } else { leaves_at.max(crossing.t0) };
             crossing.exit = (!ends_inside).then_some(a);
             if !visit(&crossing) || ends_inside {
                 return;
             }
-            let done = if self.d[a] > 0.0 { plane[a] >= hi[a] } else { plane[a] <= lo[a] };
+            let mut done = false;
+            for b in 0..3 {
+                let at_end = if forward[b] { plane[b] >= hi[b] } else { plane[b] <= lo[b] };
+                let back = crossing.cell[b] - size;
+                let cell = if forward[b] { plane[b] } else { back };
+                let beyond = if forward[b] { (plane[b] + size).min(hi[b]) } else { back };
+                let crossed_at = self.plane(b, beyond);
+                let is_crossed = b == a;
+                done |= is_crossed & at_end;
+                crossing.cell[b] = if is_crossed { cell } else { crossing.cell[b] };
+                plane[b] = if is_crossed { beyond } else { plane[b] };
+                next[b] = if is_crossed { crossed_at } else { next[b] };
+            }
             if done {
                 return;
             }
-            if self.d[a] > 0.0 {
-                crossing.cell[a] = plane[a];
-                plane[a] = (plane[a] + size).min(hi[a]);
-            } else {
-                crossing.cell[a] -= size;
-                plane[a] = crossing.cell[a];
-            }
-            next[a] = self.plane(a, plane[a]);
             crossing.t0 = crossing.t1;
             crossing.entry = Some(a);
         }
