@@ -2,7 +2,7 @@
 
 use datasets::catalogue::SEED;
 use datasets::cli::CureExt as _;
-use datasets::generate::mixing_layer::MixingLayer;
+use datasets::generate::mixing_layer::{self, MixingLayer};
 use datasets::generate::nested_wavelet::{POINTS, isovalues_for};
 use datasets::generate::wavelet::Wavelet;
 use datasets::isosurface::{self, Options, PlaneSource as _};
@@ -10,6 +10,8 @@ use datasets::stored_volume;
 use rayon::prelude::*;
 use rt_core::mesh::TriMesh;
 use rt_core::stored_volume::{StoredVolumeReport, ValueType, VolumeLayout};
+use rt_core::volume::GridExtent;
+use std::ops::Range;
 use std::path::Path;
 
 /// Planes of the mixing layer that are made before they are stored.
@@ -42,6 +44,32 @@ pub fn store_mixing_layer(
         planes.iter().try_for_each(|plane| writer.add_plane(plane))?;
     }
     Ok((layout, stored_volume::finish(writer)?))
+}
+
+/// The interface of the mixing layer in pieces; see [`store_mixing_layer`] for the layer and for
+/// `progress`. The field is not rounded to bytes.
+///
+/// # Errors
+/// Those of `progress` and of `take`.
+pub fn mixing_layer_pieces(
+    points: u32,
+    options: Options,
+    progress: &mut dyn FnMut(u32, u32) -> anyhow::Result<()>,
+    take: impl FnMut(TriMesh) -> anyhow::Result<()>,
+) -> anyhow::Result<()> {
+    let layer = MixingLayer::new(points, SEED);
+    let (dims, origin, spacing) = (layer.dims(), layer.origin(), layer.spacing());
+    let extent = GridExtent { dims, origin, spacing };
+    let plane = dims.x as usize * dims.y as usize;
+    let fill = |range: Range<u32>, values: &mut [f32]| {
+        progress(range.start, dims.z)?;
+        let planes = values.par_chunks_mut(plane).enumerate();
+        planes.for_each(|(k, plane)| layer.fill_plane(range.start + k as u32, plane));
+        Ok(())
+    };
+    let batch = PLANES_AT_ONCE as usize;
+    isosurface::extract_pieces(&extent, mixing_layer::ISO, options, batch, fill, take)?;
+    Ok(())
 }
 
 /// One of the nested surfaces of the wavelet.

@@ -420,12 +420,59 @@ fn a_stored_volume_has_the_picture_of_the_lattice_in_memory_and_refuses_the_rest
     refused(&[&store[..], &["--isovalue", "3"]].concat(), ["--isovalue", "belongs to meshes"]);
     refused(&[&store[..], &["--memory", "3"]].concat(), ["--memory", "belongs to meshes"]);
     refused(&[&store[..], &["--array", "other"]].concat(), ["`other`", "`waves`"]);
-    let mesh = of("waves.rtmesh");
-    refused(&["store", &vti, "-o", &mesh, "--array", "waves"], ["--array", "belongs to volumes"]);
     refused(&["store", &of("ball.vtp"), "-o", &stored], ["cannot be stored as a volume", "mesh"]);
-    let layer = ["store", "--mixing-layer", "48", "-o"];
-    refused(&[&layer[..], &[&mesh]].concat(), ["--mixing-layer", "belongs to volumes"]);
-    let made = bench(&[&layer[..], &[&stored, "--json"]].concat());
+    let made = bench(&["store", "--mixing-layer", "48", "-o", &stored, "--json"]);
     let said: Value = serde_json::from_slice(&made.stdout).unwrap();
     assert_eq!(said["dims"], serde_json::json!([48, 48, 45]));
+}
+
+#[test]
+fn an_isosurface_of_image_data_is_stored_in_pieces_with_the_triangles_of_the_whole() {
+    let dir = tempfile::tempdir().unwrap();
+    let of = |name: &str| dir.path().join(name).display().to_string();
+    files(dir.path());
+    let (raw, vti) = (of("waves_30x20x90_int16.raw"), of("field.vti"));
+    let at = |i: u32| [i % 30, i / 30 % 20, i / 600].map(|x| 0.2 * f64::from(x));
+    let wave = |[x, y, z]: [f64; 3]| 9000.0 * (x.sin() + y.cos() + (z + x).sin());
+    let values = (0..54_000).flat_map(|i| (wave(at(i)) as i16).to_le_bytes());
+    std::fs::write(&raw, values.collect::<Vec<u8>>()).unwrap();
+    let stored = of("surface.rtmesh");
+    for file in [&raw, &vti] {
+        let opened = datasets::read::open(file).unwrap();
+        let data = opened.dataset().unwrap();
+        let name = data.attributes().unwrap().point[0].name.clone();
+        let grid = data.to_grid(&name).unwrap();
+        let (lo, hi) = grid.range().unwrap();
+        for isovalue in [None, Some(0.3 * lo + 0.7 * hi)] {
+            let level = isovalue.map(|v| v.to_string());
+            let given: Vec<&str> = level.iter().flat_map(|v| ["--isovalue", v.as_str()]).collect();
+            let store = ["store", file.as_str(), "-o", &stored, "--json", "--array", &name];
+            let made = bench(&[&store[..], &given].concat());
+            assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+            let said: Value = serde_json::from_slice(&made.stdout).unwrap();
+            let isovalue = f64::from(isovalue.unwrap_or(0.5 * lo + 0.5 * hi));
+            let whole = datasets::isosurface::extract(&grid, &[isovalue], Default::default());
+            assert_eq!(said["triangles"], whole.unwrap().mesh.num_triangles(), "{file}");
+            assert!(said["attribute_bytes"].as_u64().unwrap() > 0, "it has normals: {said}");
+        }
+    }
+    let made = bench(&["store", "--mixing-layer", "48", "-o", &stored, "--json"]);
+    let said: Value = serde_json::from_slice(&made.stdout).unwrap();
+    let layer = datasets::generate::mixing_layer::MixingLayer::new(48, datasets::catalogue::SEED);
+    let whole = layer.surface(Default::default(), |_| true).unwrap();
+    assert_eq!(said["triangles"], whole.mesh.num_triangles());
+
+    let refused = |args: &[&str], words: [&str; 2]| {
+        let out = bench(args);
+        let text = String::from_utf8_lossy(&out.stderr).into_owned();
+        assert!(matches!(out.status.code(), Some(1 | 2)), "{args:?}: {text}");
+        assert!(words.iter().all(|word| text.contains(word)), "{args:?}: {text}");
+    };
+    let store = ["store", raw.as_str(), "-o", stored.as_str()];
+    refused(&[&store[..], &["--array", "other"]].concat(), ["`other`", "`waves`"]);
+    refused(&[&store[..], &["--color-by", "waves"]].concat(), ["--color-by", "one value"]);
+    let ball = of("ball.vtp");
+    let store = ["store", ball.as_str(), "-o", stored.as_str()];
+    refused(&[&store[..], &["--array", "z"]].concat(), ["--array", "belongs to image data"]);
+    refused(&[&store[..], &["--isovalue", "1"]].concat(), ["--isovalue", "belongs to image data"]);
 }

@@ -11,9 +11,9 @@
 //! std::fs::write(&raw, (0..24).collect::<Vec<u8>>())?;
 //!
 //! let path = folder.join("ramp.rtvolume");
-//! let mut planes = VolumePlanes::open(&raw)?.expect("a file that can be read by planes");
+//! let planes = VolumePlanes::open(&raw)?.expect("a file that can be read by planes");
 //! let mut writer = stored_volume::create(&path, planes.layout())?;
-//! while let Some(plane) = planes.next() {
+//! for plane in planes {
 //!     writer.add_plane(&plane?)?;
 //! }
 //! assert_eq!(stored_volume::finish(writer)?.points, 24);

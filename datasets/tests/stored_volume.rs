@@ -107,9 +107,9 @@ fn files(folder: &Path) -> Vec<(PathBuf, ValueType)> {
 }
 
 fn store(path: &Path, to: &Path) -> Result<(), ReadError> {
-    let mut planes = VolumePlanes::open(path)?.expect("a file that can be read by planes");
+    let planes = VolumePlanes::open(path)?.expect("a file that can be read by planes");
     let mut writer = create(to, planes.layout()).expect("a new file");
-    while let Some(plane) = planes.next() {
+    for plane in planes {
         writer.add_plane(&plane?).expect("a plane");
     }
     finish(writer).expect("a complete file");

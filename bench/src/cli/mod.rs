@@ -8,6 +8,8 @@ mod render;
 mod report;
 mod run;
 mod store;
+mod store_isosurface;
+mod store_job;
 mod store_volume;
 mod stored_file;
 
@@ -103,8 +105,8 @@ struct StoreArgs {
         value_parser = clap::value_parser!(u32).range(1..=100_000)
     )]
     wavelet: Option<u32>,
-    /// Instead of a file, as a volume: a Richtmyer-Meshkov-like mixing layer of POINTS x POINTS x
-    /// 0.9375 POINTS bytes (2048 for that of the dissertation)
+    /// Instead of a file: a Richtmyer-Meshkov-like mixing layer of POINTS x POINTS x 0.9375 POINTS
+    /// (2048 for that of the dissertation), as a volume of bytes or the interface as a mesh
     #[arg(
         long,
         value_name = "POINTS",
@@ -116,7 +118,7 @@ struct StoreArgs {
     /// `bench render` draws any isosurface without triangles
     #[arg(long, short, value_name = "FILE")]
     out: PathBuf,
-    /// The array of a volume [default: what the file marks, else the first]
+    /// The array of image data [default: what the file marks, else the first]
     #[arg(long, value_name = "ARRAY", requires = "file")]
     array: Option<String>,
     /// Isovalue for image data [default: the middle of the range]

@@ -1,22 +1,18 @@
 //! `bench store`: writes meshes to files that are larger than memory, and volumes
 //! ([`super::store_volume`]).
 
-use super::mesh_file::with_origin;
-use super::{StoreArgs, store_volume};
-use crate::image::subject::{LoadOptions, PartColoring, Subject};
-use crate::stored_data::wavelet_surfaces;
-use anyhow::Context as _;
+use super::store_job::StoreJob;
+use super::{StoreArgs, store_isosurface, store_volume};
+use crate::stored_data::{mixing_layer_pieces, wavelet_surfaces};
 use datasets::cli::{Cancel, CommonArgs, CureExt as _, UsageError};
+use datasets::isosurface::Options;
 use datasets::read::ply_pieces::PlyPieces;
 use datasets::read::stl_pieces::StlPieces;
+use datasets::read::volume_planes::VolumePlanes;
 use datasets::read::vtk_xml::{PieceFiles, piece_files};
 use datasets::read::{Content, LoadedFile};
-use datasets::{PagedFile, stored_mesh};
-use rt_core::bvh::{Geometry, StoredMeshReport, StoredMeshWriter};
-use rt_core::glam::DVec3;
-use rt_core::mesh::{MeshSlices, TriMesh};
+use rt_core::bvh::StoredMeshReport;
 use serde_json::json;
-use std::collections::HashSet;
 use std::path::Path;
 use std::time::Instant;
 
@@ -37,24 +33,18 @@ pub(super) fn store(common: CommonArgs, args: &StoreArgs) -> anyhow::Result<()> 
     if store_volume::is_meant(&args.out) {
         return store_volume::store(common, args);
     }
-    let of_volumes =
-        [("--array", args.array.is_some()), ("--mixing-layer", args.mixing_layer.is_some())];
-    if let Some((option, _)) = of_volumes.iter().find(|(_, given)| *given) {
-        let shown = args.out.display();
-        return Err(UsageError(format!(
-            "{option} belongs to volumes, and {shown} is a mesh: leave it out, or write to \
-             FILE.rtvolume"
-        ))
-        .into());
-    }
     let cancel = Cancel::on_ctrl_c()?;
     let start = Instant::now();
     let memory = args.memory.unwrap_or(DEFAULT_MEMORY);
     let memory = usize::try_from(memory).unwrap_or(usize::MAX).saturating_mul(1 << 20);
-    let report = match (&args.file, args.wavelet) {
-        (Some(file), None) => store_file(common, args, file, memory, &cancel)?,
-        (None, Some(millions)) => store_wavelet(common, args, millions, memory, &cancel)?,
-        _ => return Err(UsageError("give a file, or --wavelet MILLIONS".into()).into()),
+    let report = match (&args.file, args.wavelet, args.mixing_layer) {
+        (Some(file), None, None) => store_file(common, args, file, memory, &cancel)?,
+        (None, Some(millions), None) => store_wavelet(common, args, millions, memory, &cancel)?,
+        (None, None, Some(points)) => store_mixing_layer(common, args, points, memory, &cancel)?,
+        _ => {
+            let text = "give a file, or --wavelet MILLIONS, or --mixing-layer POINTS";
+            return Err(UsageError(text.into()).into());
+        }
     };
     let seconds = start.elapsed().as_secs_f64();
     let shown = args.out.display();
@@ -98,7 +88,9 @@ fn store_file(
     let named =
         |extension: &str| file.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension));
     let mut job = StoreJob::new(common, args, memory, cancel);
-    if named("stl")
+    if let Some(planes) = VolumePlanes::open(file)? {
+        store_isosurface::of_planes(&mut job, args, file, planes)?;
+    } else if named("stl")
         && args.color_by.is_none()
         && let Some(pieces) = StlPieces::open(file, PIECE)?
     {
@@ -131,7 +123,11 @@ fn store_file(
             bar.inc(1);
         }
     } else {
-        job.add_file(file, &datasets::read::open(file)?, None)?;
+        let opened = datasets::read::open(file)?;
+        match store_isosurface::field_of(args, &opened)? {
+            Some(field) => store_isosurface::of_field(&mut job, args, file, &field)?,
+            None => job.add_file(file, &opened, None)?,
+        }
     }
     job.finish(file)
 }
@@ -144,120 +140,24 @@ fn is_empty(opened: &LoadedFile) -> bool {
     }
 }
 
-/// A file that is being written.
-struct StoreJob<'a> {
+/// See [`mixing_layer_pieces`].
+fn store_mixing_layer(
     common: CommonArgs,
-    args: &'a StoreArgs,
+    args: &StoreArgs,
+    points: u32,
     memory: usize,
-    cancel: &'a Cancel,
-    /// Started by the first mesh, whose origin all positions are relative to.
-    writer: Option<(StoredMeshWriter<PagedFile>, DVec3)>,
-    /// What the user was told: pieces of a file are wanting in the same ways.
-    warned: HashSet<String>,
-    has_normals: bool,
-}
-
-impl<'a> StoreJob<'a> {
-    fn new(common: CommonArgs, args: &'a StoreArgs, memory: usize, cancel: &'a Cancel) -> Self {
-        let (writer, warned, has_normals) = (None, HashSet::new(), false);
-        StoreJob { common, args, memory, cancel, writer, warned, has_normals }
-    }
-
-    fn origin(&self) -> Option<DVec3> {
-        self.writer.as_ref().map(|(_, origin)| *origin)
-    }
-
-    fn warn_once(&mut self, text: String) {
-        if !self.warned.contains(&text) {
-            let file = self.args.file.as_ref().unwrap_or(&self.args.out);
-            self.common.warn(format_args!("{}: {text}", file.display()));
-            self.warned.insert(text);
-        }
-    }
-
-    /// Adds the meshes of a file, or of a piece of it.
-    fn add_file(
-        &mut self,
-        file: &Path,
-        opened: &LoadedFile,
-        origin: Option<DVec3>,
-    ) -> anyhow::Result<()> {
-        let options = LoadOptions {
-            isovalue: self.args.isovalue,
-            color_by: self.args.color_by.clone(),
-            origin,
-            ..LoadOptions::default()
-        };
-        let subject = Subject::from_file(opened, &options)
-            .with_context(|| format!("{}: no triangles to store", file.display()))?;
-        for warning in subject.warnings {
-            self.warn_once(warning);
-        }
-        let all = subject.parts.len();
-        let with_materials = subject
-            .parts
-            .iter()
-            .any(|p| matches!(p.coloring, PartColoring::FileMaterial(_) | PartColoring::Glass(_)));
-        if with_materials && !self.args.no_attributes {
-            self.warn_once("materials are not stored, but colours of vertices are".into());
-        }
-        let meshes: Vec<_> = subject
-            .parts
-            .into_iter()
-            .filter_map(|part| match part.geometry {
-                Geometry::Mesh(mesh) => Some(mesh),
-                Geometry::Shape(_) | Geometry::Slices(_) => None,
-            })
-            .collect();
-        if meshes.len() < all {
-            let left_out = all - meshes.len();
-            self.warn_once(format!("{left_out} parts that are not triangles are left out"));
-        }
-        if meshes.iter().any(|mesh| mesh.texcoords.is_some()) && !self.args.no_attributes {
-            self.warn_once("texture coordinates are not stored".into());
-        }
-        let Some(first) = meshes.first() else { return Ok(()) };
-        let origin = self.origin().unwrap_or(first.origin);
-        let (meshes, moved) = with_origin(meshes, origin);
-        if moved > 0 {
-            self.common.note(0, format_args!("{moved} meshes moved to the origin of the first"));
-        }
-        meshes.iter().try_for_each(|mesh| self.add(mesh))
-    }
-
-    /// Adds a mesh, with its attributes unless the user wants none.
-    fn add(&mut self, mesh: &TriMesh) -> anyhow::Result<()> {
-        self.cancel.check()?;
-        let writer = match &mut self.writer {
-            Some((writer, _)) => writer,
-            None => {
-                let mut writer = stored_mesh::create(&self.args.out, mesh.origin)?;
-                writer.set_memory(self.memory);
-                writer.set_normal_tolerance(self.args.normal_tolerance);
-                &mut self.writer.insert((writer, mesh.origin)).0
-            }
-        };
-        self.has_normals |= mesh.normals.is_some();
-        if self.args.no_attributes {
-            writer.add(&MeshSlices::of_mesh(mesh))?;
-        } else {
-            writer.add_mesh(mesh)?;
-        }
-        Ok(())
-    }
-
-    fn finish(mut self, file: &Path) -> anyhow::Result<StoredMeshReport> {
-        if self.args.normal_tolerance > 0.0 && !self.has_normals {
-            self.warn_once("--normal-tolerance has no effect: there are no normals".into());
-        }
-        let Some((writer, _)) = self.writer else {
-            let shown = file.display();
-            let text =
-                format!("{shown} has no triangles; `bench render {shown}` shows what it has");
-            return Err(UsageError(text).into());
-        };
-        Ok(stored_mesh::finish(writer)?)
-    }
+    cancel: &Cancel,
+) -> anyhow::Result<StoredMeshReport> {
+    let mut job = StoreJob::new(common, args, memory, cancel);
+    let options = Options { normals: !args.no_attributes, ..Options::default() };
+    let bar = common.progress(u64::from(points), "storing");
+    let mut progress = |done, all| {
+        bar.set_length(u64::from(all));
+        bar.set_position(u64::from(done));
+        Ok(cancel.check()?)
+    };
+    mixing_layer_pieces(points, options, &mut progress, |mesh| job.add(&mesh))?;
+    job.finish(&args.out)
 }
 
 /// See [`wavelet_surfaces`].

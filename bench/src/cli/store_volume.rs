@@ -39,7 +39,7 @@ pub(super) fn store(common: CommonArgs, args: &StoreArgs) -> anyhow::Result<()> 
     let (layout, report) = match (&args.file, args.mixing_layer) {
         (None, Some(points)) => mixing_layer(common, args, points, &cancel)?,
         (Some(file), _) => match VolumePlanes::open(file)? {
-            Some(planes) => by_planes(common, args, planes, &cancel)?,
+            Some(planes) => by_planes(common, args, file, planes, &cancel)?,
             None => as_a_whole(common, args, file, &cancel)?,
         },
         (None, None) => {
@@ -78,20 +78,18 @@ pub(super) fn store(common: CommonArgs, args: &StoreArgs) -> anyhow::Result<()> 
 fn by_planes(
     common: CommonArgs,
     args: &StoreArgs,
-    mut planes: VolumePlanes,
+    file: &Path,
+    planes: VolumePlanes,
     cancel: &Cancel,
 ) -> anyhow::Result<(VolumeLayout, StoredVolumeReport)> {
-    if let Some(array) = args.array.as_ref().filter(|array| *array != planes.name()) {
-        let text = format!("there is no array `{array}`; the file has `{}` alone", planes.name());
-        return Err(UsageError(text).into());
-    }
+    planes.must_be_named(args.array.as_deref())?;
     for warning in planes.warnings() {
-        common.warn(format_args!("{warning}"));
+        common.warn(format_args!("{}: {warning}", file.display()));
     }
     let layout = planes.layout();
     let mut writer = stored_volume::create(&args.out, layout)?;
     let bar = common.progress(u64::from(layout.dims.z), "storing");
-    while let Some(plane) = planes.next() {
+    for plane in planes {
         cancel.check()?;
         writer.add_plane(&plane?)?;
         bar.inc(1);
@@ -146,7 +144,7 @@ fn mixing_layer(
 }
 
 /// The array that the file marks as its scalars, or else the first.
-fn marked_or_first(data: &Dataset) -> Option<String> {
+pub(super) fn marked_or_first(data: &Dataset) -> Option<String> {
     let attributes = data.leaves().into_iter().find_map(Dataset::attributes)?;
     let marked = attributes.point_scalars.clone().or_else(|| attributes.cell_scalars.clone());
     let first = attributes.point.first().or_else(|| attributes.cell.first());

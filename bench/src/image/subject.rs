@@ -386,7 +386,10 @@ fn lattice(
 }
 
 /// The isovalue that was asked for, or that in the middle of the range of a field.
-fn isovalue_in(range: Option<(f32, f32)>, isovalue: Option<f32>) -> anyhow::Result<f32> {
+///
+/// # Errors
+/// When the field has no finite value, or no surface at that isovalue.
+pub fn isovalue_in(range: Option<(f32, f32)>, isovalue: Option<f32>) -> anyhow::Result<f32> {
     let Some((lo, hi)) = range else {
         anyhow::bail!("the field has no finite value: there is no isosurface to draw");
     };

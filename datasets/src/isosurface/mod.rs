@@ -13,6 +13,7 @@
 //! | `slab.rs` | counting and emitting a range of planes |
 //! | `gradient.rs` | normals |
 //! | `stream.rs` | fields larger than memory, a batch of planes at a time |
+//! | `pieces.rs` | surfaces larger than memory, a batch of planes at a time |
 //!
 //! A value that is NaN or infinite empties the eight cells around it. The number of skipped cells
 //! is reported.
@@ -20,9 +21,11 @@
 mod case_table;
 mod gradient;
 mod inside_bits;
+mod pieces;
 mod slab;
 mod stream;
 
+pub use pieces::extract_pieces;
 pub use stream::{PlaneSource, extract_streamed};
 
 use glam::{DVec3, Vec3};

@@ -2,6 +2,7 @@ use super::*;
 use crate::generate::wavelet::Wavelet;
 use crate::testing::{open_or_flipped_edges, volume, with_threads};
 use glam::UVec3;
+use rt_core::volume::GridExtent;
 
 /// A grid of `n`³ points around zero with spacing 1 whose values come from the position.
 fn sampled(n: u32, mut f: impl FnMut(DVec3) -> f64) -> Grid {
@@ -142,6 +143,60 @@ fn streamed_equals_in_memory_for_any_batch() {
         for batch in [0, 4, 5, 11, 40, 1000] {
             let streamed = extract_streamed(&grid, 150.0, options, batch, |_| true).unwrap();
             assert!(streamed == whole, "batch of {batch}, missing {missing}");
+        }
+    }
+}
+
+#[test]
+fn pieces_have_the_triangles_of_the_whole_for_any_batch() {
+    // The corners of each triangle, with their normals.
+    fn corners(mesh: &TriMesh) -> Vec<[[u32; 6]; 3]> {
+        let normals = mesh.normals.as_ref().expect("asked for");
+        let corner = |k: u32| {
+            let (p, n) = (mesh.positions[k as usize], normals.values[k as usize]);
+            [p.x, p.y, p.z, n.x, n.y, n.z].map(f32::to_bits)
+        };
+        mesh.indices.iter().map(|t| t.map(corner)).collect()
+    }
+    let mut grid = Wavelet::with_points(40).grid().unwrap();
+    for missing in [false, true] {
+        if missing {
+            grid.values_mut()[40 * 40 * 17 + 40 * 3 + 5] = f32::NAN;
+            grid.values_mut()[40 * 40 * 4 + 40 * 20 + 20] = f32::INFINITY;
+        }
+        let options = Options { normals: true, scalars: true };
+        let whole = extract(&grid, &[150.0], options).unwrap();
+        let (dims, origin, spacing) = (grid.dims(), grid.origin(), grid.spacing());
+        let extent = GridExtent { dims, origin, spacing };
+        for batch in [0, 5, 6, 11, 40, 1000] {
+            let (mut next, mut all, mut pieces) = (0, Vec::new(), 0);
+            let skipped = extract_pieces(
+                &extent,
+                150.0,
+                options,
+                batch,
+                |range, values| {
+                    assert_eq!(range.start, next, "each plane is asked for once, in order");
+                    next = range.end;
+                    let from = range.start as usize * 1600;
+                    values.copy_from_slice(&grid.values()[from..][..values.len()]);
+                    Ok::<_, IsosurfaceError>(())
+                },
+                |piece| {
+                    assert_eq!(piece.origin, whole.mesh.origin);
+                    assert_eq!(piece.validate().skipped(), 0);
+                    let scalars = piece.scalars.as_ref().expect("asked for");
+                    assert!(scalars.values.iter().all(|v| *v == 150.0));
+                    assert_eq!(scalars.values.len(), piece.positions.len());
+                    all.extend(corners(&piece));
+                    pieces += 1;
+                    Ok(())
+                },
+            );
+            assert_eq!(skipped.unwrap(), whole.skipped_cells);
+            assert_eq!(next, 40, "all planes are asked for");
+            assert!(all == corners(&whole.mesh), "batch of {batch}, missing {missing}");
+            assert!(batch > 11 || pieces > 4, "batch of {batch}: {pieces} pieces");
         }
     }
 }

@@ -3,7 +3,7 @@
 use super::error::{At, Fault, TRUNCATED, io_error};
 use super::volume::{Packing, ValuesPlace, Volume, check_inflation};
 use super::{ReadError, mhd, nrrd, raw};
-use crate::model::{ScalarType, Values};
+use crate::model::{Endian, ScalarType, Values};
 use glam::{DMat3, DVec3, UVec3};
 use rt_core::stored_volume::{ValueType, VolumeLayout};
 use std::fs::File;
@@ -100,31 +100,56 @@ impl VolumePlanes {
         &self.place.volume.name
     }
 
+    /// Accepts the name of an array if it is that of the file.
+    ///
+    /// # Errors
+    /// For another name.
+    pub fn must_be_named(&self, array: Option<&str>) -> Result<(), ReadError> {
+        match array {
+            Some(array) if array != self.name() => {
+                let what = format!("there is no array `{array}`");
+                let cure = format!("the file has `{}` alone", self.name());
+                let fault = Fault::option(At::Field("the array".into()), what, cure);
+                Err(fault.in_file(&self.place.file, self.place.format))
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// What was found odd in the file.
     pub fn warnings(&self) -> &[String] {
         &self.warnings
     }
 
-    fn next_plane(&mut self) -> Result<Vec<u8>, ReadError> {
+    /// The values of the next plane as numbers, x fastest; `None` after the last.
+    ///
+    /// # Errors
+    /// When the file cannot be read. After an error there is nothing more.
+    pub fn next_numbers(&mut self) -> Option<Result<Vec<f32>, ReadError>> {
+        self.next_values(|kind, bytes, endian| Values::from_bytes(kind, &bytes, endian).to_f32())
+    }
+
+    /// What `decode` makes of the bytes of the next plane.
+    fn next_values<T>(
+        &mut self,
+        decode: impl FnOnce(ScalarType, Vec<u8>, Endian) -> T,
+    ) -> Option<Result<T, ReadError>> {
+        if self.read >= u64::from(self.layout.dims.z) {
+            return None;
+        }
         let Volume { kind, endian, .. } = self.place.volume;
         let points = self.layout.dims.x as usize * self.layout.dims.y as usize;
         let mut bytes = vec![0; points * kind.size()];
-        self.source.read_exact(&mut bytes).map_err(|e| {
+        if let Err(e) = self.source.read_exact(&mut bytes) {
             // Also what a decoder says of damaged data.
             let (at, planes) = (self.read, self.layout.dims.z);
             let at = At::Field(format!("plane {at} of {planes} (counted from 0)"));
-            Fault::new(at, e.to_string(), TRUNCATED).in_file(&self.place.file, self.place.format)
-        })?;
-        Ok(match kind {
-            ScalarType::U8 | ScalarType::I8 => bytes,
-            ScalarType::U16 | ScalarType::I16 => {
-                Values::from_bytes(kind, &bytes, endian).to_le_bytes()
-            }
-            _ => {
-                let values = Values::from_bytes(kind, &bytes, endian).to_f32();
-                values.iter().flat_map(|x| x.to_le_bytes()).collect()
-            }
-        })
+            let fault = Fault::new(at, e.to_string(), TRUNCATED);
+            self.read = u64::MAX;
+            return Some(Err(fault.in_file(&self.place.file, self.place.format)));
+        }
+        self.read += 1;
+        Some(Ok(decode(kind, bytes, endian)))
     }
 }
 
@@ -141,12 +166,15 @@ impl Iterator for VolumePlanes {
     type Item = Result<Vec<u8>, ReadError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        if self.read >= u64::from(self.layout.dims.z) {
-            return None;
-        }
-        let plane = self.next_plane();
-        // After an error there is nothing more.
-        self.read = if plane.is_ok() { self.read + 1 } else { u64::MAX };
-        Some(plane)
+        self.next_values(|kind, bytes, endian| match kind {
+            ScalarType::U8 | ScalarType::I8 => bytes,
+            ScalarType::U16 | ScalarType::I16 => {
+                Values::from_bytes(kind, &bytes, endian).to_le_bytes()
+            }
+            _ => {
+                let values = Values::from_bytes(kind, &bytes, endian).to_f32();
+                values.iter().flat_map(|x| x.to_le_bytes()).collect()
+            }
+        })
     }
 }

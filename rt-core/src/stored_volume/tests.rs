@@ -38,28 +38,27 @@ fn values(of: ValueType) -> (Vec<u8>, Vec<f32>) {
     let mut numbers = Vec::new();
     for p in points(DIMS) {
         let v = field(p);
-        match of {
+        let (encoded, number): (Vec<u8>, f32) = match of {
             ValueType::U8 => {
                 let v = (100.0 + 100.0 * v) as u8;
-                (bytes.push(v), numbers.push(f32::from(v)));
+                (vec![v], v.into())
             }
             ValueType::I8 => {
                 let v = (100.0 * v) as i8;
-                (bytes.extend(v.to_le_bytes()), numbers.push(f32::from(v)));
+                (v.to_le_bytes().to_vec(), v.into())
             }
             ValueType::U16 => {
                 let v = (30_000.0 + 30_000.0 * v) as u16;
-                (bytes.extend(v.to_le_bytes()), numbers.push(f32::from(v)));
+                (v.to_le_bytes().to_vec(), v.into())
             }
             ValueType::I16 => {
                 let v = (30_000.0 * v) as i16;
-                (bytes.extend(v.to_le_bytes()), numbers.push(f32::from(v)));
+                (v.to_le_bytes().to_vec(), v.into())
             }
-            ValueType::F32 => {
-                let v = v as f32;
-                (bytes.extend(v.to_le_bytes()), numbers.push(v));
-            }
-        }
+            ValueType::F32 => ((v as f32).to_le_bytes().to_vec(), v as f32),
+        };
+        bytes.extend(encoded);
+        numbers.push(number);
     }
     (bytes, numbers)
 }
@@ -240,7 +239,7 @@ fn layouts_and_planes_that_cannot_be_are_refused_by_name() {
     let short = writer.add_plane(&plane[1..]).expect_err("a byte is missing").to_string();
     assert!(short.contains("plane 0 (counted from 0): 5395 bytes; it must have 5396"), "{short}");
     writer.add_plane(&plane).expect("a plane");
-    let few = writer.finish().err().expect("planes are missing").to_string();
+    let few = writer.finish().expect_err("planes are missing").to_string();
     assert!(few.contains("plane 1 (counted from 0): 0 bytes"), "{few}");
     let mut writer = StoredVolumeWriter::new(Vec::new(), sound).expect("memory");
     (0..DIMS.z).for_each(|_| writer.add_plane(&plane).expect("a plane"));
