@@ -471,8 +471,15 @@ fn an_isosurface_of_image_data_is_stored_in_pieces_with_the_triangles_of_the_who
     let store = ["store", raw.as_str(), "-o", stored.as_str()];
     refused(&[&store[..], &["--array", "other"]].concat(), ["`other`", "`waves`"]);
     refused(&[&store[..], &["--color-by", "waves"]].concat(), ["--color-by", "one value"]);
+    refused(&[&store[..], &["--isovalue", "99999"]].concat(), ["99999", "choose --isovalue"]);
+    // A flat image is the surface that it is.
+    let flat = of("flat_30x20x1_uint8.raw");
+    std::fs::write(&flat, [7; 600]).unwrap();
+    let made = bench(&["store", &flat, "-o", &stored, "--json"]);
+    let said: Value = serde_json::from_slice(&made.stdout).unwrap();
+    assert_eq!(said["triangles"], 2 * 29 * 19);
     let ball = of("ball.vtp");
     let store = ["store", ball.as_str(), "-o", stored.as_str()];
-    refused(&[&store[..], &["--array", "z"]].concat(), ["--array", "belongs to image data"]);
-    refused(&[&store[..], &["--isovalue", "1"]].concat(), ["--isovalue", "belongs to image data"]);
+    refused(&[&store[..], &["--array", "z"]].concat(), ["--array", "of image data"]);
+    refused(&[&store[..], &["--isovalue", "1"]].concat(), ["--isovalue", "of image data"]);
 }

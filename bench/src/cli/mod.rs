@@ -71,8 +71,8 @@ struct RunArgs {
     /// Smaller data and fewer rounds: each experiment within a minute
     #[arg(long)]
     quick: bool,
-    /// The dissertation's own sizes (stored-files). Takes half an hour and 20 GB on disk, asked
-    /// for first; the files are kept in the cache (RTSV_CACHE) for the next run
+    /// The dissertation's own sizes (stored-files). Takes a quarter of an hour and up to 16 GB
+    /// on disk, asked for first; the files are kept in the cache (RTSV_CACHE) for the next run
     #[arg(long, conflicts_with = "quick")]
     thesis: bool,
     /// Also keep the records in bench/runs/DATE-MACHINE/. Rejected if the tree has uncommitted

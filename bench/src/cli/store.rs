@@ -88,7 +88,9 @@ fn store_file(
     let named =
         |extension: &str| file.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension));
     let mut job = StoreJob::new(common, args, memory, cancel);
-    if let Some(planes) = VolumePlanes::open(file)? {
+    // A flat image has no isosurface; it is stored as the surface that it is.
+    let planes = VolumePlanes::open(file)?.filter(|p| p.layout().dims.min_element() >= 2);
+    if let Some(planes) = planes {
         store_isosurface::of_planes(&mut job, args, file, planes)?;
     } else if named("stl")
         && args.color_by.is_none()

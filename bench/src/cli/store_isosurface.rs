@@ -44,13 +44,10 @@ pub(super) fn of_planes(
     let isovalue = match args.isovalue {
         Some(value) => value,
         None => {
-            let mut range: Option<(f32, f32)> = None;
+            let mut range = None;
             while let Some(plane) = planes.next_numbers() {
                 job.cancel().check()?;
-                for v in plane?.into_iter().filter(|v| v.is_finite()) {
-                    let (lo, hi) = range.unwrap_or((v, v));
-                    range = Some((lo.min(v), hi.max(v)));
-                }
+                include(&mut range, &plane?);
             }
             let again = VolumePlanes::open(file)?;
             planes = again.with_context(|| format!("{}: it has changed", file.display()))?;
@@ -62,16 +59,29 @@ pub(super) fn of_planes(
     let plane = dims.x as usize * dims.y as usize;
     let bar = job.progress(u64::from(dims.z));
     let cancel = job.cancel();
-    let fill = |range: std::ops::Range<u32>, values: &mut [f32]| {
+    let mut range = None;
+    let fill = |planes_read: std::ops::Range<u32>, values: &mut [f32]| {
         for to in values.chunks_mut(plane) {
             cancel.check()?;
             let next = planes.next_numbers().context("a plane is missing")??;
+            include(&mut range, &next);
             to.copy_from_slice(&next);
         }
-        bar.set_position(u64::from(range.end));
+        bar.set_position(u64::from(planes_read.end));
         anyhow::Ok(())
     };
-    surface(job, &GridExtent { dims, origin, spacing }, isovalue, fill)
+    surface(job, &GridExtent { dims, origin, spacing }, isovalue, fill)?;
+    // Known only now; an isovalue outside of the range has no surface.
+    isovalue_in(range, Some(isovalue)).with_context(|| file.display().to_string())?;
+    Ok(())
+}
+
+/// Adds the finite values to a range.
+fn include(range: &mut Option<(f32, f32)>, values: &[f32]) {
+    for &v in values.iter().filter(|v| v.is_finite()) {
+        let (lo, hi) = range.unwrap_or((v, v));
+        *range = Some((lo.min(v), hi.max(v)));
+    }
 }
 
 /// The field of image data in memory; `None` where there is none, or only its boundary can be

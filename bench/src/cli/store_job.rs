@@ -74,7 +74,7 @@ impl<'a> StoreJob<'a> {
             [("--array", self.args.array.is_some()), ("--isovalue", self.args.isovalue.is_some())];
         if let Some((option, _)) = of_image_data.iter().find(|(_, given)| *given) {
             let text = format!(
-                "{option} belongs to image data, and {} has none; leave it out",
+                "{option} belongs to isosurfaces of image data, and {} has none; leave it out",
                 file.display()
             );
             return Err(UsageError(text).into());

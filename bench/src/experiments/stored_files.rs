@@ -13,13 +13,13 @@ use datasets::catalogue;
 use datasets::generate::mixing_layer::{self, MixingLayer};
 use datasets::view::View;
 use datasets::{stored_mesh, stored_volume};
-use rt_core::bvh::{BuildOptions, Geometry, Instance, PageUse, StoredMesh, World};
+use rt_core::bvh::{BuildOptions, Geometry, Instance, PageUse, World};
 use rt_core::camera::Camera;
 use rt_core::glam::{DAffine3, DVec3};
 use rt_core::render::{RenderOptions, render};
 use rt_core::scene::Scene;
 use rt_core::shapes::{IsosurfaceNormals, Shape};
-use rt_core::stored_volume::{StoredIsosurface, StoredVolume};
+use rt_core::stored_volume::StoredIsosurface;
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -188,9 +188,8 @@ fn measure_layer(
         .with("bytes_per_element", report.bytes as f64 / report.points as f64)
         .with("open", open_secs * 1e3);
     let row = prepare_secs.map_or(row.clone(), |secs| row.with("prepare", secs));
-    let used = |volume: &StoredVolume| volume.page_use();
     let views = MixingLayer::views();
-    frames(context, record, sizes, Arc::new(surface), &views, &row, &|| used(&volume))
+    frames(context, record, sizes, Arc::new(surface), &views, &row, &|| volume.page_use())
 }
 
 fn measure_wavelet(
@@ -209,7 +208,8 @@ fn measure_wavelet(
             writer.set_memory(STORING);
             for surface in wavelet_surfaces(millions, false)? {
                 let surface = surface?;
-                context.report_share(format!("storing {}", surface.label), surface.share)?;
+                let share = 0.4 + 0.5 * surface.share;
+                context.report_share(format!("storing {}", surface.label), share)?;
                 writer.add_mesh(&surface.mesh)?;
             }
             stored_mesh::finish(writer)?;
@@ -225,9 +225,8 @@ fn measure_wavelet(
         .with("bytes_per_element", report.bytes as f64 / report.triangles as f64)
         .with("open", open_secs * 1e3);
     let row = prepare_secs.map_or(row.clone(), |secs| row.with("prepare", secs));
-    let used = |mesh: &StoredMesh| mesh.page_use();
     let views = catalogue::find("wavelet")?.views();
-    frames(context, record, sizes, mesh.clone(), &views, &row, &|| used(&mesh))
+    frames(context, record, sizes, mesh.clone(), &views, &row, &|| mesh.page_use())
 }
 
 /// Frames of all views in turns, after a first one of each.
