@@ -16,6 +16,14 @@ fn bench(args: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_bench")).args(args).output().expect("the program starts")
 }
 
+/// Asserts that the program refuses these arguments, with these words.
+fn refused(args: &[&str], words: [&str; 2]) {
+    let out = bench(args);
+    let text = String::from_utf8_lossy(&out.stderr).into_owned();
+    assert!(matches!(out.status.code(), Some(1 | 2)), "{args:?}: {text}");
+    assert!(words.iter().all(|word| text.contains(word)), "{args:?}: {text}");
+}
+
 fn ball() -> TriMesh {
     let mut mesh = datasets::generate::shapes::icosphere(3);
     mesh.scalars = Some(Attribute::per_vertex(mesh.positions.iter().map(|p| p.z).collect()));
@@ -406,12 +414,6 @@ fn a_stored_volume_has_the_picture_of_the_lattice_in_memory_and_refuses_the_rest
         assert!(said["stored"]["page_reads"].as_u64().unwrap() >= 1, "{said}");
     }
 
-    let refused = |args: &[&str], words: [&str; 2]| {
-        let out = bench(args);
-        let text = String::from_utf8_lossy(&out.stderr).into_owned();
-        assert!(matches!(out.status.code(), Some(1 | 2)), "{args:?}: {text}");
-        assert!(words.iter().all(|word| text.contains(word)), "{args:?}: {text}");
-    };
     let render = ["render", stored.as_str(), "-o", png.as_str()];
     refused(&[&render[..], &["--isovalue", "300"]].concat(), ["300", "choose --isovalue"]);
     refused(&[&render[..], &["--color-by", "waves"]].concat(), ["--color-by", "leave it out"]);
@@ -462,12 +464,6 @@ fn an_isosurface_of_image_data_is_stored_in_pieces_with_the_triangles_of_the_who
     let whole = layer.surface(Default::default(), |_| true).unwrap();
     assert_eq!(said["triangles"], whole.mesh.num_triangles());
 
-    let refused = |args: &[&str], words: [&str; 2]| {
-        let out = bench(args);
-        let text = String::from_utf8_lossy(&out.stderr).into_owned();
-        assert!(matches!(out.status.code(), Some(1 | 2)), "{args:?}: {text}");
-        assert!(words.iter().all(|word| text.contains(word)), "{args:?}: {text}");
-    };
     let store = ["store", raw.as_str(), "-o", stored.as_str()];
     refused(&[&store[..], &["--array", "other"]].concat(), ["`other`", "`waves`"]);
     refused(&[&store[..], &["--color-by", "waves"]].concat(), ["--color-by", "one value"]);

@@ -2,7 +2,7 @@
 
 use super::StoreArgs;
 use super::store_job::StoreJob;
-use crate::image::subject::isovalue_in;
+use crate::image::subject::{isovalue_in, marked_or_first_array};
 use anyhow::Context as _;
 use datasets::cli::UsageError;
 use datasets::isosurface::{Options, extract_pieces};
@@ -92,7 +92,7 @@ pub(super) fn field_of(args: &StoreArgs, opened: &LoadedFile) -> anyhow::Result<
         [leaf @ (Dataset::ImageData(_) | Dataset::RectilinearGrid(_))] => leaf,
         _ => return Ok(None),
     };
-    let array = args.array.clone().or_else(|| super::store_volume::marked_or_first(leaf));
+    let array = args.array.clone().or_else(|| marked_or_first_array(leaf));
     let Some(array) = array else { return Ok(None) };
     match leaf.to_grid(&array) {
         Ok(grid) if grid.dims().min_element() >= 2 => Ok(Some(grid)),

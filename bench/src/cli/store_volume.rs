@@ -1,10 +1,10 @@
 //! `bench store` of image data as a volume.
 
 use super::StoreArgs;
+use crate::image::subject::marked_or_first_array;
 use crate::stored_data::store_mixing_layer;
 use anyhow::Context as _;
 use datasets::cli::{Cancel, CommonArgs, CureExt as _, UsageError};
-use datasets::model::Dataset;
 use datasets::read::volume_planes::VolumePlanes;
 use datasets::stored_volume;
 use rt_core::stored_volume::{StoredVolumeReport, ValueType, VolumeLayout};
@@ -110,7 +110,7 @@ fn as_a_whole(
     }
     let cannot = || format!("{}: cannot be stored as a volume", file.display());
     let data = opened.dataset().with_context(cannot)?;
-    let array = args.array.clone().or_else(|| marked_or_first(data));
+    let array = args.array.clone().or_else(|| marked_or_first_array(data));
     let array = array.with_context(|| format!("{}: it has no array", cannot()))?;
     let grid = data.to_grid(&array).with_context(cannot);
     let grid = grid.cure("store a mesh instead, in FILE.rtmesh, or resample it to image data")?;
@@ -141,12 +141,4 @@ fn mixing_layer(
         bar.set_position(u64::from(done));
         Ok(cancel.check()?)
     })
-}
-
-/// The array that the file marks as its scalars, or else the first.
-pub(super) fn marked_or_first(data: &Dataset) -> Option<String> {
-    let attributes = data.leaves().into_iter().find_map(Dataset::attributes)?;
-    let marked = attributes.point_scalars.clone().or_else(|| attributes.cell_scalars.clone());
-    let first = attributes.point.first().or_else(|| attributes.cell.first());
-    marked.or_else(|| first.map(|array| array.name.clone()))
 }

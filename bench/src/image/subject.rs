@@ -278,11 +278,7 @@ impl Subject {
 // ---- data sets ----------------------------------------------------------------------------------
 fn from_data(data: &Dataset, load_options: &LoadOptions) -> anyhow::Result<Subject> {
     let mut subject = Subject::empty(DVec3::Z);
-    let marked = || {
-        let a = data.leaves().into_iter().find_map(|d| d.attributes())?;
-        a.point_scalars.clone().or_else(|| a.cell_scalars.clone())
-    };
-    let color = load_options.color_by.clone().or_else(marked);
+    let color = load_options.color_by.clone().or_else(|| marked_array(data));
     if let Some(request) = &load_options.color_by {
         ColorBy::find(data, request)?;
     }
@@ -353,6 +349,17 @@ fn add_volume(
     subject.extend_scalar_range(&[lo, hi]);
     subject.volume = Some(VolumeField { grid: Arc::new(grid), range: [lo, hi] });
     Ok(())
+}
+
+/// The array that a file marks as its scalars.
+fn marked_array(data: &Dataset) -> Option<String> {
+    let a = data.leaves().into_iter().find_map(|d| d.attributes())?;
+    a.point_scalars.clone().or_else(|| a.cell_scalars.clone())
+}
+
+/// The array that a file marks as its scalars, or else the first.
+pub fn marked_or_first_array(data: &Dataset) -> Option<String> {
+    marked_array(data).or_else(|| first_array(data))
 }
 
 /// The first array of a file; arrays on points come before those on cells.
