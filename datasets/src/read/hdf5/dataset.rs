@@ -26,6 +26,7 @@ pub(super) struct Stored<'s> {
     pub(super) space: Dataspace,
     layout: Layout,
     filters: Vec<Filter>,
+    /// The value of elements that were never written; empty for zeros.
     fill: Vec<u8>,
 }
 
@@ -46,7 +47,8 @@ impl<'s> Stored<'s> {
         }
         let layout = layout(source, layout_at, space.dims.len(), datatype.size)?;
         let filters = find(kind::FILTERS).map_or(Ok(Vec::new()), |m| pipeline(source, m))?;
-        let mut fill = vec![0; datatype.size];
+        // Not `size` zeros: a size that no file can have is only refused when values are read.
+        let mut fill = Vec::new();
         if let Some(m) = find(kind::FILL).or(find(kind::OLD_FILL)) {
             let mut f = source.fields(&m.data, m.address);
             let size = if m.kind == kind::OLD_FILL {
