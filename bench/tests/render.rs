@@ -391,16 +391,23 @@ fn a_stored_volume_has_the_picture_of_the_lattice_in_memory_and_refuses_the_rest
     let (stored, png) = (of("waves.rtvolume"), of("picture.png"));
     let camera = of("camera.toml");
     std::fs::write(&camera, "eye = [80.0, -40.0, 60.0]\ntarget = [20.0, 18.0, 17.0]\n").unwrap();
-    let pixels = |file: &str| {
-        let options = ["--isovalue", "150.5", "--effects", "shadows", "--camera", camera.as_str()];
-        let size = ["--size", "96x96", "--samples", "1", "--json"];
-        let drawn = bench(&[&["render", file, "-o", &png], &options[..], &size].concat());
+    let drawn = |file: &str, options: &[&str]| {
+        let size = ["--size", "96x96", "--samples", "1", "--json", "--camera", camera.as_str()];
+        let drawn = bench(&[&["render", file, "-o", &png], options, &size].concat());
         assert!(drawn.status.success(), "{}", String::from_utf8_lossy(&drawn.stderr));
         let said: Value = serde_json::from_slice(&drawn.stdout).unwrap();
         (read_png(Path::new(&png)).unwrap().rgba().unwrap(), said)
     };
+    let pixels = |file: &str| drawn(file, &["--isovalue", "150.5", "--effects", "shadows"]);
     let (expected, _) = pixels(&raw);
     assert!(expected.iter().filter(|c| **c != expected[0]).count() > 1500);
+    // As a medium, alone and with a surface in it; no memory: each brick is read again and again.
+    let looks: [&[&str]; 2] = [
+        &["--effects", "volumes", "--opacity", "120:0,200:0.8", "--range", "100,220"],
+        &["--effects", "volumes", "--isovalue", "150.5"],
+    ];
+    let media = looks.map(|look| drawn(&raw, look).0);
+    assert!(media[0] != expected && media[1] != media[0]);
     for (file, least, most) in [(&raw, 1.0, 1.4), (&vti, 4.0, 5.0)] {
         let made = bench(&["store", file, "-o", &stored, "--json"]);
         assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
@@ -412,12 +419,18 @@ fn a_stored_volume_has_the_picture_of_the_lattice_in_memory_and_refuses_the_rest
         assert!(found == expected, "{file}");
         assert_eq!(said["format"], "stored volume");
         assert!(said["stored"]["page_reads"].as_u64().unwrap() >= 1, "{said}");
+        for (look, expected) in looks.iter().zip(&media) {
+            let (found, said) = drawn(&stored, &[*look, &["--memory", "0"]].concat());
+            assert!(found == *expected, "{file}: {look:?}");
+            assert!(said["rays"]["volume"].as_u64().unwrap() > 1000, "{said}");
+        }
     }
 
     let render = ["render", stored.as_str(), "-o", png.as_str()];
     refused(&[&render[..], &["--isovalue", "300"]].concat(), ["300", "choose --isovalue"]);
     refused(&[&render[..], &["--color-by", "waves"]].concat(), ["--color-by", "leave it out"]);
-    refused(&[&render[..], &["--effects", "volumes"]].concat(), ["volumes", "leave it out"]);
+    refused(&[&render[..], &["--volume", "waves"]].concat(), ["--volume", "--effects volumes"]);
+    refused(&[&render[..], &["--range", "0,9"]].concat(), ["--range", "leave it out"]);
     let store = ["store", raw.as_str(), "-o", stored.as_str()];
     refused(&[&store[..], &["--isovalue", "3"]].concat(), ["--isovalue", "belongs to meshes"]);
     refused(&[&store[..], &["--memory", "3"]].concat(), ["--memory", "belongs to meshes"]);

@@ -1,7 +1,7 @@
 //! Errors of rendering.
 
 use crate::camera::CameraError;
-use crate::scene::SceneError;
+use crate::scene::{Scene, SceneError};
 
 /// Why an image could not be rendered.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -41,6 +41,14 @@ pub enum RenderError {
         /// What the shape says.
         reason: String,
     },
+    /// A stored volume could not be read, so the image is not right.
+    #[error("volume {volume} (counted from 0) could not be read while rendering: {reason}")]
+    UnreadableVolume {
+        /// Number of the volume in the scene.
+        volume: usize,
+        /// What went wrong.
+        reason: String,
+    },
     /// A bug: the renderer panicked. The rest of the process is not affected.
     #[error(
         "internal error at pixel ({x}, {y}), sample {sample}: {message}; it repeats with crop: \
@@ -64,4 +72,18 @@ pub enum RenderError {
         /// What happened.
         reason: String,
     },
+}
+
+impl RenderError {
+    /// Whether a frame of the scene passed through data that could not be read: nobody knows what
+    /// its rays would have met there.
+    pub fn unreadable(scene: &Scene) -> Option<RenderError> {
+        if let Some((geometry, reason)) = scene.world.failure() {
+            return Some(RenderError::Unreadable { geometry, reason });
+        }
+        scene.volumes.iter().enumerate().find_map(|(volume, placed)| {
+            let reason = placed.volume.failure()?.to_owned();
+            Some(RenderError::UnreadableVolume { volume, reason })
+        })
+    }
 }

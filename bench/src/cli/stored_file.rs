@@ -17,7 +17,11 @@ const DEFAULT_MEMORY: u64 = 1024;
 /// An open file.
 pub(super) enum StoredFile {
     Mesh(Arc<StoredMesh>),
-    Volume(Arc<StoredVolume>),
+    Volume {
+        volume: Arc<StoredVolume>,
+        /// Bytes for the parts of the medium, if it is drawn as one.
+        medium: Option<usize>,
+    },
 }
 
 /// Opens the file, when `bench store` wrote it.
@@ -31,7 +35,7 @@ pub(super) fn open(args: &RenderArgs, options: &LoadOptions) -> anyhow::Result<O
         return open_mesh(args, options, memory).map(|mesh| Some(StoredFile::Mesh(mesh)));
     }
     if read.is_ok() && StoredVolume::recognizes(&start) {
-        return open_volume(args, options, memory).map(|volume| Some(StoredFile::Volume(volume)));
+        return open_volume(args, options, memory).map(Some);
     }
     if args.memory.is_some() {
         let file = args.file.display();
@@ -91,17 +95,25 @@ fn open_volume(
     args: &RenderArgs,
     options: &LoadOptions,
     memory: usize,
-) -> anyhow::Result<Arc<StoredVolume>> {
+) -> anyhow::Result<StoredFile> {
+    let is_medium = options.volume != VolumeChoice::No;
     let without_effect = [
-        ("--volume, or the effect `volumes`,", options.volume != VolumeChoice::No),
+        ("--volume", args.volume.is_some()),
         ("--color-by", options.color_by.is_some()),
-        ("--range", args.range.is_some()),
         ("--storage", args.storage != Storage::Plain),
         ("--robustness", args.robustness != Robustness::Watertight),
     ];
-    let reason = "a stored volume is drawn as an isosurface of one colour, without triangles";
+    let reason = "a stored volume has one array without a name, and no triangles; `--effects \
+                  volumes` draws it as a medium";
     refuse_without_effect(&args.file, &without_effect, reason)?;
-    Ok(Arc::new(datasets::stored_volume::open(&args.file, memory)?))
+    let reason = "a stored volume is drawn as an isosurface of one colour without `--effects \
+                  volumes`";
+    refuse_without_effect(&args.file, &[("--range", args.range.is_some() && !is_medium)], reason)?;
+    // A part of a medium is made of a brick and the points around it, in single precision: up to
+    // six times the bytes that are read.
+    let medium = is_medium.then_some(memory / 4 * 3);
+    let volume = datasets::stored_volume::open(&args.file, memory - medium.unwrap_or(0))?;
+    Ok(StoredFile::Volume { volume: Arc::new(volume), medium })
 }
 
 impl StoredFile {
@@ -113,8 +125,10 @@ impl StoredFile {
     ) -> anyhow::Result<Subject> {
         match self {
             StoredFile::Mesh(mesh) => Ok(Subject::from_stored_mesh(mesh)),
-            StoredFile::Volume(volume) => Subject::from_stored_volume(volume, options.isovalue)
-                .with_context(|| format!("{}: cannot be drawn so", args.file.display())),
+            StoredFile::Volume { volume, medium } => {
+                Subject::from_stored_volume(volume, options.isovalue, *medium)
+                    .with_context(|| format!("{}: cannot be drawn so", args.file.display()))
+            }
         }
     }
 
@@ -122,7 +136,7 @@ impl StoredFile {
     pub(super) fn format(&self) -> &'static str {
         match self {
             StoredFile::Mesh(_) => "stored mesh",
-            StoredFile::Volume(_) => "stored volume",
+            StoredFile::Volume { .. } => "stored volume",
         }
     }
 
@@ -130,7 +144,7 @@ impl StoredFile {
     pub(super) fn triangles(&self) -> u64 {
         match self {
             StoredFile::Mesh(mesh) => mesh.report().triangles,
-            StoredFile::Volume(_) => 0,
+            StoredFile::Volume { .. } => 0,
         }
     }
 
@@ -149,7 +163,7 @@ impl StoredFile {
                 let report = mesh.report();
                 object(mesh.page_use(), report.pages, report.bytes)
             }
-            StoredFile::Volume(volume) => {
+            StoredFile::Volume { volume, .. } => {
                 let report = volume.report();
                 object(volume.page_use(), report.bricks, report.bytes)
             }

@@ -40,8 +40,8 @@ const MARGIN: f64 = 1.04;
 
 /// World corners of all geometry.
 pub(super) fn bounds(scene: &Scene) -> anyhow::Result<(DVec3, DVec3)> {
-    let volumes =
-        scene.volumes.iter().map(|v| (v.volume.grid().origin(), v.volume.grid().max_corner()));
+    let extents = scene.volumes.iter().map(|v| v.volume.extent());
+    let volumes = extents.map(|extent| (extent.origin, extent.max_corner()));
     let all = bounds_of_surfaces(&scene.world).into_iter().chain(volumes);
     corners(all.reduce(|(a, b), (c, d)| (a.min(c), b.max(d))))
 }
@@ -63,6 +63,19 @@ impl Framing {
     /// The camera for everything in a world, z up, for an image of `size` pixels.
     pub fn of(&self, world: &World, size: [u32; 2]) -> anyhow::Result<Camera> {
         let (lo, hi) = corners(bounds_of_surfaces(world))?;
+        self.of_box(lo, hi, size)
+    }
+
+    /// The camera for all of a scene, its volumes too.
+    ///
+    /// # Errors
+    /// As [`Framing::of`].
+    pub fn of_scene(&self, scene: &Scene, size: [u32; 2]) -> anyhow::Result<Camera> {
+        let (lo, hi) = bounds(scene)?;
+        self.of_box(lo, hi, size)
+    }
+
+    fn of_box(&self, lo: DVec3, hi: DVec3, size: [u32; 2]) -> anyhow::Result<Camera> {
         let outline =
             |point: &mut dyn FnMut(DVec3)| corners_of_box(lo, hi).into_iter().for_each(point);
         let view = self.fitted(&outline, DVec3::Z, size);

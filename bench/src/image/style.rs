@@ -5,7 +5,7 @@
 //! ambient light is a quarter of white. All lights move with the camera, so every visible surface
 //! is lit.
 
-use super::subject::{PartColoring, Subject, VolumeField};
+use super::subject::{FieldValues, PartColoring, Subject, VolumeField};
 use anyhow::Context as _;
 use datasets::colormaps;
 use glam::{DVec3, Vec3};
@@ -179,11 +179,18 @@ impl RenderStyle {
     fn volume(&self, field: &VolumeField) -> anyhow::Result<Volume> {
         let [lo, hi] = self.range.unwrap_or(field.range);
         let ramp = vec![[lo, 0.0], [hi, RAMP_OPACITY]];
-        let stretch = OPACITY_STRETCH * (field.grid.max_corner() - field.grid.origin()).length();
+        let [low, high] = field.corners();
+        let stretch = OPACITY_STRETCH * (high - low).length();
         let opacity = self.opacity.as_ref().unwrap_or(&ramp);
         let transfer =
             TransferFunction::from_opacity(self.color_map([lo, hi])?, opacity, stretch as f32)?;
-        Ok(Volume::new(field.grid.clone(), transfer, VolumeOptions::default())?)
+        let options = VolumeOptions::default();
+        Ok(match &field.values {
+            FieldValues::Grid(grid) => Volume::new(grid.clone(), transfer, options)?,
+            FieldValues::Stored { volume, memory } => {
+                Volume::stored(volume.clone(), *memory, transfer, options)?
+            }
+        })
     }
 
     fn lights(&self) -> Vec<Light> {

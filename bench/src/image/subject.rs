@@ -6,7 +6,7 @@ use anyhow::Context as _;
 use datasets::catalogue::Data;
 use datasets::model::{ColorBy, Dataset};
 use datasets::read::{Content, LoadedFile, SceneModel};
-use glam::{DVec3, Vec3};
+use glam::{DVec3, UVec3, Vec3};
 use rt_core::bvh::{Geometry, StoredMesh};
 use rt_core::grid::Grid;
 use rt_core::material::Material;
@@ -52,12 +52,40 @@ impl Part {
 }
 
 /// A field drawn as a glowing medium.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub struct VolumeField {
     /// The scalars.
-    pub grid: Arc<Grid>,
-    /// Its smallest and largest finite value.
+    pub values: FieldValues,
+    /// Their smallest and largest finite value.
     pub range: [f32; 2],
+}
+
+/// Where the scalars of a field are.
+#[derive(Clone)]
+pub enum FieldValues {
+    /// In memory.
+    Grid(Arc<Grid>),
+    /// In a file.
+    Stored {
+        /// The file.
+        volume: Arc<StoredVolume>,
+        /// Bytes for the parts of the medium that rays have met last.
+        memory: usize,
+    },
+}
+
+impl VolumeField {
+    /// World positions of the first and the last point.
+    pub fn corners(&self) -> [DVec3; 2] {
+        match &self.values {
+            FieldValues::Grid(grid) => [grid.origin(), grid.max_corner()],
+            FieldValues::Stored { volume, .. } => {
+                let layout = volume.layout();
+                let size = (layout.dims - UVec3::ONE).as_dvec3() * layout.spacing;
+                [layout.origin, layout.origin + size]
+            }
+        }
+    }
 }
 
 /// All geometry and volumes of an image.
@@ -148,7 +176,8 @@ impl Subject {
             }
         }
         if let Some(v) = &self.volume {
-            corners_of_box(v.grid.origin(), v.grid.max_corner()).into_iter().for_each(point);
+            let [low, high] = v.corners();
+            corners_of_box(low, high).into_iter().for_each(point);
         }
     }
 
@@ -232,16 +261,29 @@ impl Subject {
         subject
     }
 
-    /// An isosurface of a volume that is larger than memory; without an isovalue, that in the
-    /// middle of the range.
+    /// A volume that is larger than memory: a medium whose parts in memory take `medium` bytes, if
+    /// any, and an isosurface, unless there is a medium and no isovalue. Without either, the
+    /// isovalue is in the middle of the range.
     ///
     /// # Errors
-    /// When there is no such surface.
+    /// When there is no such surface, or no finite value.
     pub fn from_stored_volume(
         volume: &Arc<StoredVolume>,
         isovalue: Option<f32>,
+        medium: Option<usize>,
     ) -> anyhow::Result<Subject> {
         let mut subject = Subject::empty(DVec3::Z);
+        if let Some(memory) = medium {
+            let range = volume.range();
+            let (lo, hi) = range.context("no value is finite: as a volume it would be empty")?;
+            subject.contents.push(format!("volume of {} points", volume.report().points));
+            subject.extend_scalar_range(&[lo, hi]);
+            let values = FieldValues::Stored { volume: volume.clone(), memory };
+            subject.volume = Some(VolumeField { values, range: [lo, hi] });
+            if isovalue.is_none() {
+                return Ok(subject);
+            }
+        }
         let isovalue = isovalue_in(volume.range(), isovalue)?;
         let normals = IsosurfaceNormals::Smooth;
         let surface = StoredIsosurface::new(volume.clone(), &[isovalue], normals)?;
@@ -347,7 +389,8 @@ fn add_volume(
         grid.dims().as_u64vec3().element_product()
     ));
     subject.extend_scalar_range(&[lo, hi]);
-    subject.volume = Some(VolumeField { grid: Arc::new(grid), range: [lo, hi] });
+    subject.volume =
+        Some(VolumeField { values: FieldValues::Grid(Arc::new(grid)), range: [lo, hi] });
     Ok(())
 }
 

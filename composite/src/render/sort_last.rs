@@ -311,11 +311,10 @@ impl DataParallel {
     }
 }
 
-/// Whether all shapes of a rank could read their data. Else nobody knows what its rays passed
-/// through.
+/// Whether all shapes and volumes of a rank could read their data.
 fn readable(scene: &Scene) -> Result<(), FrameError> {
-    match scene.world.failure() {
-        Some((geometry, reason)) => Err(RenderError::Unreadable { geometry, reason }.into()),
+    match RenderError::unreadable(scene) {
+        Some(error) => Err(error.into()),
         None => Ok(()),
     }
 }

@@ -10,6 +10,7 @@ use rt_core::light::Light;
 use rt_core::material::Material;
 use rt_core::render::{RenderOptions, render};
 use rt_core::scene::{SceneBuilder, VolumeInstance};
+use rt_core::stored_volume::{StoredVolume, StoredVolumeWriter, ValueType, VolumeLayout};
 use rt_core::transfer_function::TransferFunction;
 use rt_core::volume::{
     Blend, GradientOpacity, Interpolation, Volume, VolumeOptions, VolumeQuality, VolumeShading,
@@ -116,6 +117,36 @@ fn alone(volumes: Vec<VolumeInstance>) -> Case {
     scene.volumes = volumes;
     let options = RenderOptions { width: 100, height: 81, layers: Layers::COLOR, ..options() };
     Case { name: "volumes alone", scene, camera: camera(DVec3::ZERO), options }
+}
+
+/// The volume with its values in a file.
+fn stored(volume: &Volume) -> Volume {
+    let grid = volume.grid();
+    let (dims, origin, spacing) = (grid.dims(), grid.origin(), grid.spacing());
+    let layout = VolumeLayout { dims, origin, spacing, values: ValueType::F32 };
+    let mut writer = StoredVolumeWriter::new(Vec::new(), layout).unwrap();
+    for plane in grid.values().chunks((dims.x * dims.y) as usize) {
+        let bytes: Vec<u8> = plane.iter().flat_map(|v| v.to_le_bytes()).collect();
+        writer.add_plane(&bytes).unwrap();
+    }
+    let source = StoredVolume::open(writer.finish().unwrap().0, 1 << 20).unwrap();
+    let (transfer, options) = (volume.transfer_function().clone(), volume.options().clone());
+    Volume::stored(source.into(), 1 << 20, transfer, options).unwrap()
+}
+
+#[test]
+fn volumes_in_files_are_cut_over_the_ranks_and_have_the_bits_of_one_node() {
+    let of = |name| case(name, Some(Material::dielectric(1.5)), three());
+    let (in_memory, mut in_files) = (of("volumes in memory"), of("volumes in files"));
+    for placed in &mut in_files.scene.volumes {
+        placed.volume = stored(&placed.volume).into();
+    }
+    let expected = one_node(&in_memory);
+    assert_eq!(differing_pixels(&expected, &one_node(&in_files)), 0);
+    for ranks in [2, 7] {
+        let outputs = many(&in_files, ranks, &Split::Triangles, SecondaryRayPolicy::Forward);
+        assert_same(&expected, &outputs, &format!("{ranks} ranks"));
+    }
 }
 
 #[test]

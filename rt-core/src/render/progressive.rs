@@ -199,8 +199,8 @@ impl<'a> ProgressiveRenderer<'a> {
             };
             self.tiles.par_iter_mut().map(draw_tile).try_reduce(none, add)?
         };
-        if let Some((geometry, reason)) = context.scene.world.failure() {
-            return Err(RenderError::Unreadable { geometry, reason });
+        if let Some(error) = RenderError::unreadable(context.scene) {
+            return Err(error);
         }
         self.rays += rays;
         let complete = missing == 0;

@@ -158,6 +158,17 @@ impl StoredBrick {
         with_values!(&self.values, |values| number(values[index]))
     }
 
+    /// The values of neighbours along x, from a point on; all are points that it [has](Self::has).
+    #[cfg(feature = "render")]
+    pub(super) fn row(&self, first: UVec3, out: &mut [f32]) {
+        let index = self.index(first);
+        with_values!(&self.values, |values| {
+            for (out, &value) in out.iter_mut().zip(&values[index..]) {
+                *out = number(value);
+            }
+        });
+    }
+
     /// The values at the corners of a cell of this brick, x fastest.
     #[inline]
     pub(super) fn corners(&self, cell: UVec3) -> [f32; 8] {

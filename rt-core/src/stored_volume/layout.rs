@@ -4,7 +4,7 @@ use super::error::StoredVolumeError;
 use glam::{DVec3, UVec3};
 
 /// Cells along the edge of a brick.
-pub(super) const BRICK_CELLS: u32 = 32;
+pub(crate) const BRICK_CELLS: u32 = 32;
 
 /// How a value is stored. All are little-endian.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -87,12 +87,12 @@ impl VolumeLayout {
     }
 
     /// Bricks along each axis.
-    pub(super) fn bricks(&self) -> UVec3 {
+    pub(crate) fn bricks(&self) -> UVec3 {
         self.dims.map(|points| points.saturating_sub(1).div_ceil(BRICK_CELLS))
     }
 
     /// The number of the brick with these places along the axes.
-    pub(super) fn number(&self, place: UVec3) -> u32 {
+    pub(crate) fn number(&self, place: UVec3) -> u32 {
         let bricks = self.bricks();
         (place.z * bricks.y + place.y) * bricks.x + place.x
     }

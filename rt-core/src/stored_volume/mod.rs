@@ -5,7 +5,8 @@
 //! points that bricks share). A [`StoredVolume`] has the smallest and the largest value of each
 //! brick in memory, 24 bytes a brick. A [`StoredIsosurface`] is a [`Shape`] whose primitives are
 //! the bricks that the surface crosses, for any isovalue: rays meet the trilinear interpolant
-//! itself, and no triangle is made. A brick is read when a ray first enters it, and leaves when the
+//! itself, and no triangle is made. A medium can stay in its file too (`volume::Volume::stored`). A
+//! brick is read when a ray first enters it, and leaves when the
 //! budget of memory is used up.
 //!
 //! As for stored meshes ([`crate::bvh::StoredMesh`]), files are another member's; bricks are read
@@ -24,6 +25,8 @@ mod write;
 
 pub use error::StoredVolumeError;
 pub use isosurface::StoredIsosurface;
+#[cfg(feature = "render")]
+pub(crate) use layout::BRICK_CELLS;
 pub use layout::{ValueType, VolumeLayout};
 pub use read::StoredVolume;
 pub use write::{StoredVolumeReport, StoredVolumeWriter};

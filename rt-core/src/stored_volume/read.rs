@@ -4,6 +4,8 @@ use super::StoredVolumeReport;
 use super::brick::{StoredBrick, Values};
 use super::error::StoredVolumeError;
 use super::format::{BrickEntry, ENTRY_BYTES, HEADER_BYTES, Header, MAGIC, NoHeader, VERSION};
+#[cfg(feature = "render")]
+use super::layout::BRICK_CELLS;
 use super::layout::VolumeLayout;
 use crate::paging::fields::checksum;
 use crate::paging::{PageCache, PageSource, PageUse};
@@ -140,12 +142,52 @@ impl StoredVolume {
         self.with_brick(number, |brick| brick.at(point)).unwrap_or(f32::NAN)
     }
 
-    pub(super) fn num_bricks(&self) -> u32 {
+    /// The values of a box of points of the lattice, x fastest: from `low` to before `end`. `None`
+    /// when a brick cannot be read ([`StoredVolume::failure`]).
+    #[cfg(feature = "render")]
+    pub(crate) fn values_in(&self, low: UVec3, end: UVec3) -> Option<Vec<f32>> {
+        let size = (end - low).as_usizevec3();
+        let mut values = vec![f32::NAN; size.element_product()];
+        let layout = self.header.layout;
+        let last = layout.bricks() - UVec3::ONE;
+        let brick_of = |point: UVec3| (point / BRICK_CELLS).min(last);
+        let (first, past) = (brick_of(low), brick_of(end - UVec3::ONE) + UVec3::ONE);
+        for z in first.z..past.z {
+            for y in first.y..past.y {
+                for x in first.x..past.x {
+                    let place = UVec3::new(x, y, z);
+                    let from = low.max(place * BRICK_CELLS);
+                    // Points between two bricks are taken from the upper one.
+                    let own = (place + UVec3::ONE) * BRICK_CELLS;
+                    let to = end.min(UVec3::select(place.cmpeq(last), layout.dims, own));
+                    let number = layout.number(place);
+                    let entry = &self.table[number as usize];
+                    let rows = (from.z..to.z).flat_map(|k| (from.y..to.y).map(move |j| (j, k)));
+                    let mut put = |row: &mut dyn FnMut(UVec3, &mut [f32])| {
+                        for (j, k) in rows.clone() {
+                            let p = UVec3::new(from.x, j, k);
+                            let at = (p - low).as_usizevec3();
+                            let at = (at.z * size.y + at.y) * size.x + at.x;
+                            row(p, &mut values[at..at + (to.x - from.x) as usize]);
+                        }
+                    };
+                    if entry.offset == 0 {
+                        put(&mut |_, row| row.fill(entry.range[0]));
+                    } else {
+                        self.with_brick(number, |brick| put(&mut |p, row| brick.row(p, row)))?;
+                    }
+                }
+            }
+        }
+        Some(values)
+    }
+
+    pub(crate) fn num_bricks(&self) -> u32 {
         self.table.len() as u32
     }
 
     /// Smallest and largest finite value of a brick.
-    pub(super) fn brick_range(&self, number: u32) -> [f32; 2] {
+    pub(crate) fn brick_range(&self, number: u32) -> [f32; 2] {
         self.table[number as usize].range
     }
 

@@ -46,6 +46,11 @@ impl GridExtent {
         if around_points { self.dims } else { self.dims.saturating_sub(UVec3::ONE) }
     }
 
+    /// World position of the last point.
+    pub fn max_corner(&self) -> DVec3 {
+        self.origin + self.spacing * (self.dims - UVec3::ONE).as_dvec3()
+    }
+
     /// Blocks per axis, of cells between points or of boxes around them.
     pub fn blocks(&self, around_points: bool) -> UVec3 {
         self.cells(around_points).map(|cells| cells.div_ceil(MACROCELL))
@@ -142,8 +147,11 @@ impl Volume {
     }
 
     /// Whether a block that is held here has any extinction. False for blocks that a brick does not
-    /// hold.
+    /// hold. A stored volume reads the block.
     pub fn is_occupied(&self, block: UVec3) -> bool {
+        if let Some(stored) = &self.stored {
+            return self.is_occupied_in(stored, block);
+        }
         self.held.contains(block) && self.occupied[self.block_index(block)]
     }
 
@@ -156,9 +164,13 @@ impl Volume {
 
     /// The data that `brick` needs: the values of its cells with two ghost layers of points, for
     /// gradients. The rest of the volume is clear here. See [`RaySegments`](super::RaySegments) for
-    /// an example.
+    /// an example. The part of a stored volume is in memory, without values where they cannot be
+    /// read ([`Volume::failure`]).
     pub fn part(&self, brick: Brick) -> Volume {
         let brick = Brick { first: brick.first, end: brick.end.min(self.blocks) };
+        if let Some(stored) = &self.stored {
+            return self.read_part(stored, brick);
+        }
         let [low, high] = if brick.is_empty() {
             [self.first_point, self.first_point + UVec3::ONE]
         } else {
@@ -181,11 +193,15 @@ impl Volume {
         let spacing = self.grid.spacing;
         let origin = self.origin + spacing * low.as_dvec3();
         let grid = Grid { dims: size, origin, spacing, values };
-        let whole = GridExtent { dims: self.dims, origin: self.origin, spacing };
+        self.part_of_points(brick, low, grid)
+    }
+
+    /// The part of this volume that holds `grid`, whose first point is `low` in the whole.
+    pub(super) fn part_of_points(&self, brick: Brick, low: UVec3, grid: Grid) -> Volume {
         let (transfer, options) = (self.transfer.clone(), self.options.clone());
         Volume {
             level: self.level,
-            ..Volume::of_points(whole, brick, low, grid, transfer, options)
+            ..Volume::of_points(self.extent(), brick, low, grid, transfer, options)
         }
     }
 
@@ -212,7 +228,7 @@ impl Volume {
         let [low, high] = brick.points(whole.dims, nearest);
         let origin = whole.origin + whole.spacing * low.as_dvec3();
         let grid = Grid::new(high - low, origin, whole.spacing, values)?;
-        Ok(Volume::of_points(whole, brick, low, grid, transfer, options))
+        Ok(Volume::of_points(whole, brick, low, grid, Arc::new(transfer), options))
     }
 
     /// A part that holds `grid`, whose first point is `low` in the whole.
@@ -221,7 +237,7 @@ impl Volume {
         brick: Brick,
         low: UVec3,
         grid: Grid,
-        transfer: TransferFunction,
+        transfer: Arc<TransferFunction>,
         options: VolumeOptions,
     ) -> Volume {
         let nearest = options.interpolation == Interpolation::Nearest;
@@ -257,6 +273,8 @@ impl Volume {
             report,
             level: Level::new(),
             samples: None,
+            stored: None,
+            unread: None,
         };
         part.find_occupied();
         part

@@ -13,6 +13,8 @@
 //! With [`VolumeOptions::sample_distance`] a ray takes samples instead, as VTK's GPU mapper does:
 //! `samples` (where they lie), `sample_packet` (sixteen rays at a time), `sample_medium`,
 //! `sample_table`, `sample_gradient`, `sample_light`, `empty_space`.
+//!
+//! Values may stay in a file ([`Volume::stored`]).
 
 mod adaptive;
 mod brick;
@@ -34,6 +36,7 @@ mod sample_table;
 mod samples;
 mod shading;
 mod shading_in_lanes;
+mod stored;
 
 pub use brick::{Brick, GridExtent, PartialIntegral};
 pub use options::{
@@ -59,6 +62,7 @@ use linear_segment::RayInLanes;
 use rayon::prelude::*;
 use samples::Samples;
 use std::sync::Arc;
+use stored::StoredBlocks;
 
 /// Cells along an edge of the blocks used to skip empty space.
 pub const MACROCELL: u32 = 8;
@@ -142,7 +146,8 @@ pub struct VolumeReport {
 #[derive(Debug, Clone)]
 pub struct Volume {
     grid: Arc<Grid>,
-    transfer: TransferFunction,
+    /// Shared with the parts of a stored volume.
+    transfer: Arc<TransferFunction>,
     options: VolumeOptions,
     /// Points per axis of the whole volume; those of `grid` unless this is a part.
     dims: UVec3,
@@ -165,6 +170,10 @@ pub struct Volume {
     level: Level,
     /// `None` where rays are integrated.
     samples: Option<Samples>,
+    /// The file that has the values; then no block is held here.
+    stored: Option<Arc<StoredBlocks>>,
+    /// Why the values of this part could not be read from a file.
+    unread: Option<String>,
 }
 
 impl Volume {
@@ -200,7 +209,7 @@ impl Volume {
         let (dims, origin) = (grid.dims, grid.origin);
         let mut v = Volume {
             grid,
-            transfer,
+            transfer: Arc::new(transfer),
             options,
             dims,
             origin,
@@ -213,6 +222,8 @@ impl Volume {
             report,
             level: Level::new(),
             samples: None,
+            stored: None,
+            unread: None,
         };
         v.find_occupied();
         Ok(v)
@@ -220,15 +231,27 @@ impl Volume {
 
     /// Sets another transfer function; only the list of empty blocks is recomputed.
     pub fn set_transfer_function(&mut self, transfer: TransferFunction) {
-        self.transfer = transfer;
+        self.transfer = Arc::new(transfer);
         self.find_occupied();
+        self.forget_parts();
     }
 
-    /// Sets [`VolumeOptions::viewer`], which costs no look at the grid.
+    /// Parts of a stored volume have its properties: they are made again after a change.
+    fn forget_parts(&mut self) {
+        if let Some(stored) = &self.stored {
+            let stored = stored.anew(&self.transfer);
+            self.report = stored.report(self.blocks, self.cells());
+            self.stored = Some(Arc::new(stored));
+        }
+    }
+
+    /// Sets [`VolumeOptions::viewer`], which costs no look at the grid. A stored volume is read
+    /// again.
     pub fn set_viewer(&mut self, viewer: Option<DVec3>) -> Result<(), VolumeError> {
         let options = VolumeOptions { viewer, ..self.options.clone() };
-        options.check((self.grid.max_corner() - self.grid.origin).length())?;
+        options.check((self.grid.spacing * (self.dims - UVec3::ONE).as_dvec3()).length())?;
         self.options = options;
+        self.forget_parts();
         Ok(())
     }
 
@@ -236,6 +259,7 @@ impl Volume {
     /// machine's best. Results have the same bits with all of them.
     pub fn with_simd_level(mut self, level: Option<SimdLevel>) -> Result<Self, UnavailableLevel> {
         self.level = SimdLevel::resolve(level)?;
+        self.forget_parts();
         Ok(self)
     }
 
@@ -254,13 +278,18 @@ impl Volume {
         self.origin
     }
 
+    /// The whole lattice, of which a part or a stored volume holds few points or none.
+    pub fn extent(&self) -> GridExtent {
+        GridExtent { dims: self.dims, origin: self.origin, spacing: self.grid.spacing }
+    }
+
     /// Bounds of the whole volume relative to [`Volume::origin`].
     pub fn bounds(&self) -> Aabb {
         let max_corner = self.origin + self.grid.spacing * (self.dims - UVec3::ONE).as_dvec3();
         outward_box(DVec3::ZERO, max_corner - self.origin)
     }
 
-    /// The grid; for a part, the points that it holds.
+    /// The grid; for a part, the points that it holds; for a stored volume, one.
     pub fn grid(&self) -> &Arc<Grid> {
         &self.grid
     }
@@ -352,6 +381,10 @@ impl Volume {
             return m;
         }
         let ray = self.ray_in_lanes(&index_ray, per_t);
+        if let Some(stored) = &self.stored {
+            self.march_bricks(stored, &ray, inside.0, [t0, t1], &mut m);
+            return m;
+        }
         let mut batch = CellBatch::new();
         index_ray.walk([0; 3], cells, cells, i64::from(MACROCELL), t0, t1, |passed| {
             let block = UVec3::from_array(passed.cell.map(|c| c as u32 / MACROCELL));
@@ -377,6 +410,10 @@ impl Volume {
         span: [f64; 2],
         m: &mut MarchState,
     ) {
+        if let Some(stored) = &self.stored {
+            self.march_block_in(stored, ray, anchor, block, span, m);
+            return;
+        }
         let mut batch = CellBatch::new();
         self.enter_block(ray, anchor, block, span, &mut batch, m);
         self.finish_batch(ray, &mut batch, m);

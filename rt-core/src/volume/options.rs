@@ -40,6 +40,12 @@ pub enum VolumeError {
         /// The smallest one for this grid.
         least: f64,
     },
+    /// Samples of a stored volume.
+    #[error(
+        "volume: samples a distance apart are taken of volumes in memory alone, and this one \
+         stays in its file; leave the distance out, and rays are integrated to the tolerance"
+    )]
+    StoredSamples,
 }
 
 /// Samples along the diagonal of a grid: their numbers are whole in f32 up to four times as many.

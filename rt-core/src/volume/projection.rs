@@ -6,6 +6,7 @@ use super::{Blend, MACROCELL, Volume, VolumeQuality, VolumeSample};
 use crate::grid_walk::{Crossing, IndexRay};
 use crate::ray::Ray;
 use crate::ray_cubic;
+use crate::stored_volume::BRICK_CELLS;
 use glam::UVec3;
 use std::ops::ControlFlow;
 
@@ -14,6 +15,19 @@ struct CellSegment<'a> {
     crossing: &'a Crossing,
     stored: UVec3,
     b: [f64; 4],
+    /// The volume, or the part of a stored one, that has the cell.
+    part: &'a Volume,
+}
+
+/// A ray through the cells of a volume, and what is done with them.
+struct CellVisitor<'a, W, V> {
+    ray: &'a IndexRay,
+    t0: f64,
+    t1: f64,
+    /// Cells of the whole volume.
+    cells: [i64; 3],
+    wanted: W,
+    visit: V,
 }
 
 impl Volume {
@@ -47,23 +61,54 @@ impl Volume {
         ray: &Ray,
         t0: f64,
         t1: f64,
-        mut wanted: impl FnMut(f64, f64) -> bool,
-        mut visit: impl FnMut(&IndexRay, &CellSegment<'_>) -> ControlFlow<()>,
+        wanted: impl FnMut(f64, f64) -> bool,
+        visit: impl FnMut(&IndexRay, &CellSegment<'_>) -> ControlFlow<()>,
     ) {
         let (index_ray, cells, t0, t1) = self.index_ray(ray, t0, t1);
         if t0 >= t1 {
             return;
         }
         let cells = cells.to_array().map(i64::from);
+        let mut cell_visitor = CellVisitor { ray: &index_ray, t0, t1, cells, wanted, visit };
+        let Some(stored) = &self.stored else {
+            self.visit_cells_of([0; 3], cells, &mut cell_visitor);
+            return;
+        };
+        let size = i64::from(BRICK_CELLS);
+        index_ray.walk([0; 3], cells, cells, size, t0, t1, |brick| {
+            let [low, high] = stored.range_at(brick.cell);
+            if low > high || !(cell_visitor.wanted)(low.into(), high.into()) {
+                return true;
+            }
+            let end = std::array::from_fn(|a| (brick.cell[a] + size).min(cells[a]));
+            let visit = |part: &Volume| part.visit_cells_of(brick.cell, end, &mut cell_visitor);
+            self.with_part_at(stored, brick.cell, visit).unwrap_or(true)
+        });
+    }
+
+    /// [`Volume::visit_cells`] of the cells from `lo` to before `hi`. False when there is no need
+    /// to go on.
+    fn visit_cells_of<W, V>(
+        &self,
+        lo: [i64; 3],
+        hi: [i64; 3],
+        cell_visitor: &mut CellVisitor<'_, W, V>,
+    ) -> bool
+    where
+        W: FnMut(f64, f64) -> bool,
+        V: FnMut(&IndexRay, &CellSegment<'_>) -> ControlFlow<()>,
+    {
+        let CellVisitor { ray, t0, t1, cells, wanted, visit } = cell_visitor;
+        let (index_ray, cells) = (*ray, *cells);
         let size = i64::from(MACROCELL);
         let mut going = true;
-        index_ray.walk([0; 3], cells, cells, size, t0, t1, |block| {
+        index_ray.walk(lo, hi, cells, size, *t0, *t1, |block| {
             let [low, high] = self.ranges
                 [self.block_index(UVec3::from_array(block.cell.map(|c| (c / size) as u32)))];
             if low > high || block.t1 <= block.t0 || !wanted(low.into(), high.into()) {
                 return true;
             }
-            let end = std::array::from_fn(|a| (block.cell[a] + size).min(cells[a]));
+            let end = std::array::from_fn(|a| (block.cell[a] + size).min(hi[a]));
             index_ray.walk(block.cell, end, cells, 1, block.t0, block.t1, |crossing| {
                 let stored = UVec3::from_array(crossing.cell.map(|i| i as u32)) - self.first_point;
                 let b = if self.is_nearest() {
@@ -79,12 +124,14 @@ impl Volume {
                     ray_cubic::along(&corners, &p, &q)
                 };
                 if crossing.t1 > crossing.t0 && b.iter().all(|v| v.is_finite()) {
-                    going = visit(&index_ray, &CellSegment { crossing, stored, b }).is_continue();
+                    going = visit(index_ray, &CellSegment { crossing, stored, b, part: self })
+                        .is_continue();
                 }
                 going
             });
             going
         });
+        going
     }
 
     /// The largest scalar (`sign` 1) or the smallest (−1).
@@ -207,7 +254,7 @@ impl Volume {
                 let (opacity, color) = self.transfer.sample(value);
                 let (p, q) = index_ray.fractions(s.crossing, 1);
                 let at = std::array::from_fn(|a| p[a] + (q[a] - p[a]) * u);
-                let color = self.shaded_at(index_ray, s.stored, at, color);
+                let color = s.part.shaded_at(index_ray, s.stored, at, color);
                 // A layer without thickness: this opacity, for any path through it.
                 let tau = -(-opacity.clamp(0.0, 0.999_999)).ln_1p();
                 let t = s.crossing.t0 + (s.crossing.t1 - s.crossing.t0) * u;
