@@ -1,6 +1,10 @@
 //! The program `datasets` as started by a user: its output, its files, its exit codes.
 #![cfg(feature = "program")]
 
+use datasets::{stored_mesh, stored_volume};
+use glam::{DVec3, UVec3};
+use rt_core::mesh::MeshSlices;
+use rt_core::stored_volume::{ValueType, VolumeLayout};
 use serde_json::Value;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -78,6 +82,47 @@ fn a_flow_keeps_its_fields_and_has_an_isosurface() {
     assert_eq!(out.status.code(), Some(1));
     assert!(text(&out.stderr).contains("cure: "), "{}", text(&out.stderr));
     assert!(!dir.path().join("none.ply").exists());
+}
+
+#[test]
+fn stored_files_are_described_without_reading_their_pages() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = |name: &str| dir.path().join(name);
+    let layout = VolumeLayout {
+        dims: UVec3::new(40, 5, 3),
+        origin: DVec3::ZERO,
+        spacing: DVec3::ONE,
+        values: ValueType::I16,
+    };
+    let mut writer = stored_volume::create(&path("a.rtvolume"), layout).unwrap();
+    for k in 0..3i16 {
+        let plane: Vec<u8> = (0..200).flat_map(|i| (i - 100 * k).to_le_bytes()).collect();
+        writer.add_plane(&plane).unwrap();
+    }
+    stored_volume::finish(writer).unwrap();
+    let info = json(dir.path(), &["info", "a.rtvolume"]);
+    assert_eq!((&info["format"], &info["points"]), (&"stored volume".into(), &600.into()));
+    let values = &info["parts"][0]["arrays"][0];
+    assert_eq!((&values["type"], &values["range"][0]), (&"i16".into(), &(-200.0).into()));
+    assert_eq!(info["stored"]["pages"], 2);
+    let said = text(&datasets(dir.path(), &["info", "a.rtvolume"]).stdout);
+    assert!(said.contains("40 x 5 x 3") && said.contains("-200 to 199"), "{said}");
+
+    let mut writer = stored_mesh::create(&path("a.rtmesh"), DVec3::ZERO).unwrap();
+    writer.add(&MeshSlices::new(&[0., 0., 0., 4., 0., 0., 0., 4., 0.], &[0, 1, 2])).unwrap();
+    stored_mesh::finish(writer).unwrap();
+    let info = json(dir.path(), &["info", "a.rtmesh"]);
+    assert_eq!((&info["cells"], &info["points"]), (&1.into(), &Value::Null));
+
+    // Others cannot read it, and name what can.
+    let out = datasets(dir.path(), &["convert", "a.rtvolume", "b.vti"]);
+    let said = text(&out.stderr);
+    assert!(out.status.code() == Some(1) && said.contains("bench render"), "{said}");
+    let bytes = std::fs::read(path("a.rtvolume")).unwrap();
+    std::fs::write(path("cut.rtvolume"), &bytes[..bytes.len() - 9]).unwrap();
+    let out = datasets(dir.path(), &["info", "cut.rtvolume"]);
+    let said = text(&out.stderr);
+    assert!(out.status.code() == Some(1) && said.contains("cut.rtvolume"), "{said}");
 }
 
 #[test]

@@ -1,11 +1,12 @@
 //! `datasets info`.
 
+use super::description::{Array, Info, Part, Stored};
 use super::open_args::OpenArgs;
+use super::stored_file;
 use clap::Args;
 use datasets::cli::CommonArgs;
 use datasets::model::{DataArray, Dataset};
 use datasets::read::{self, Content, SceneModel};
-use serde::Serialize;
 use std::path::PathBuf;
 
 /// Options of `datasets info`.
@@ -16,65 +17,21 @@ use std::path::PathBuf;
   datasets info --json jet.vti | jq '.parts[].arrays[].name'")]
 pub(super) struct InfoArgs {
     /// A file of any format that can be read, or the folder of an OpenFOAM case or
-    /// AMReX plotfile
+    /// AMReX plotfile, or what `bench store` wrote
     file: PathBuf,
     #[command(flatten)]
     open: OpenArgs,
 }
 
-#[derive(Serialize)]
-struct Info {
-    file: String,
-    format: &'static str,
-    kind: &'static str,
-    points: u64,
-    cells: u64,
-    materials: usize,
-    textures: usize,
-    /// Blocks of a collection, meshes of a scene, or the one data set.
-    parts: Vec<Part>,
-    /// Times of a series or case; the other fields describe the one that was read.
-    times: Vec<f64>,
-    warnings: Vec<String>,
-}
-
-#[derive(Serialize)]
-struct Part {
-    name: String,
-    kind: &'static str,
-    points: u64,
-    cells: u64,
-    arrays: Vec<Array>,
-}
-
-#[derive(Serialize)]
-struct Array {
-    name: String,
-    /// `point`, `cell` or `field`.
-    of: &'static str,
-    #[serde(rename = "type")]
-    scalar_type: &'static str,
-    components: usize,
-    tuples: usize,
-    /// Smallest and largest finite value; for a vector, those of its magnitude.
-    range: Option<(f64, f64)>,
-}
-
 /// Prints what a file holds.
 pub(super) fn info(common: CommonArgs, args: &InfoArgs) -> anyhow::Result<()> {
+    if let Some(info) = stored_file::describe(&args.file)? {
+        return print(common, info);
+    }
     let file = read::open_with(&args.file, &args.open.options())?;
-    let mut info = Info {
-        file: args.file.display().to_string(),
-        format: file.format,
-        kind: "scene",
-        points: 0,
-        cells: 0,
-        materials: 0,
-        textures: 0,
-        parts: vec![],
-        times: file.time_steps.iter().map(|t| t.time).collect(),
-        warnings: file.warnings.clone(),
-    };
+    let mut info = Info::new(&args.file, file.format, "scene");
+    info.times = file.time_steps.iter().map(|t| t.time).collect();
+    info.warnings = file.warnings.clone();
     match &file.content {
         Content::Data(data) => {
             info.kind = data.kind();
@@ -85,7 +42,12 @@ pub(super) fn info(common: CommonArgs, args: &InfoArgs) -> anyhow::Result<()> {
             add_meshes(scene, &mut info.parts);
         }
     }
-    info.points = info.parts.iter().fold(0, |sum, p| sum.saturating_add(p.points));
+    print(common, info)
+}
+
+fn print(common: CommonArgs, mut info: Info) -> anyhow::Result<()> {
+    let points = info.parts.iter().map(|p| p.points);
+    info.points = points.fold(Some(0), |sum: Option<u64>, n| Some(sum?.saturating_add(n?)));
     info.cells = info.parts.iter().fold(0, |sum, p| sum.saturating_add(p.cells));
     common.result(&info, || text(&info))
 }
@@ -102,6 +64,7 @@ fn add_parts(data: &Dataset, name: &str, parts: &mut Vec<Part>) {
             arrays.extend(list.iter().map(|array| describe(array, of)));
         }
     }
+    let points = Some(points);
     parts.push(Part { name: name.into(), kind: data.kind(), points, cells, arrays });
 }
 
@@ -111,22 +74,27 @@ fn describe(array: &DataArray, of: &'static str) -> Array {
         of,
         scalar_type: array.values.kind().name(),
         components: array.components,
-        tuples: array.tuples(),
+        tuples: Some(array.tuples() as u64),
         range: array.range(),
     }
 }
 
 fn add_meshes(scene: &SceneModel, parts: &mut Vec<Part>) {
     for m in &scene.meshes {
-        let (points, cells) = (m.mesh.positions.len() as u64, m.mesh.num_triangles() as u64);
+        let points = Some(m.mesh.positions.len() as u64);
+        let cells = m.mesh.num_triangles() as u64;
         parts.push(Part { name: m.name.clone(), kind: "mesh", points, cells, arrays: vec![] });
     }
 }
 
 fn text(info: &Info) -> String {
+    let count = |points: Option<u64>, cells: u64| match points {
+        Some(points) => format!("{points} points, {cells} cells"),
+        None => format!("{cells} cells"),
+    };
     let mut lines = vec![
         format!("{}: {}, {}", info.file, info.format, info.kind),
-        format!("  {} points, {} cells", info.points, info.cells),
+        format!("  {}", count(info.points, info.cells)),
     ];
     if info.materials > 0 {
         lines.push(format!("  {} materials, {} textures", info.materials, info.textures));
@@ -137,12 +105,14 @@ fn text(info: &Info) -> String {
     for part in &info.parts {
         if info.parts.len() > 1 || !part.name.is_empty() {
             let (name, kind) = (&part.name, part.kind);
-            lines.push(format!("  {name}: {kind}, {} points, {} cells", part.points, part.cells));
+            lines.push(format!("  {name}: {kind}, {}", count(part.points, part.cells)));
         }
         for a in &part.arrays {
-            let range = a
-                .range
-                .map_or_else(|| "no finite value".into(), |(lo, hi)| format!("{lo} to {hi}"));
+            let range = match a.range {
+                Some((lo, hi)) => format!("{lo} to {hi}"),
+                None if a.tuples.is_none() => "of unknown range".into(),
+                None => "no finite value".into(),
+            };
             let times =
                 if a.components == 1 { String::new() } else { format!(" x {}", a.components) };
             lines.push(format!(
@@ -150,6 +120,9 @@ fn text(info: &Info) -> String {
                 a.of, a.name, a.scalar_type
             ));
         }
+    }
+    if let Some(Stored { pages, bytes }) = info.stored {
+        lines.push(format!("  {bytes} bytes in {pages} pages, read when rays need them"));
     }
     lines.extend(info.warnings.iter().map(|w| format!("  warning: {w}")));
     lines.join("\n")

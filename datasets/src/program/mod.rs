@@ -1,11 +1,13 @@
 //! The command line: converts arguments to calls of the library.
 
 mod convert;
+mod description;
 mod info;
 mod list;
 mod make;
 mod open_args;
 mod output;
+mod stored_file;
 
 use clap::{Parser, Subcommand};
 use datasets::cli::{CommonArgs, CompletionsArgs, ManArgs, run_main};

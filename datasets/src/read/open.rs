@@ -1,11 +1,13 @@
 //! Detects the format of a file by its first bytes, or else by the extension of its name.
 
-use super::error::{Fault, io_error, read_bytes};
+use super::error::{At, Fault, io_error, read_bytes};
 use super::{
     LoadedFile, OpenOptions, ReadError, amrex, cgns, csv, csv_file, ensight, gltf, hdf5, mhd,
     netcdf, npy, nrrd, obj, openfoam, plot3d, ply, raw, stl, tecplot, time_axis, vtk_legacy,
     vtk_xml, vtkhdf, xdmf,
 };
+use rt_core::bvh::StoredMesh;
+use rt_core::stored_volume::StoredVolume;
 use std::io::Read;
 use std::path::Path;
 
@@ -121,6 +123,7 @@ pub fn open_with(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Loaded
     let length = file.metadata().map_err(|e| io_error(path, e))?.len();
     file.take(HEAD_BYTES).read_to_end(&mut head).map_err(|e| io_error(path, e))?;
 
+    refuse_stored(path, &head)?;
     let by_content = match head.starts_with(hdf5::MAGIC) || head.get(512..520) == Some(hdf5::MAGIC)
     {
         true => Some(from_hdf5(path)?),
@@ -236,6 +239,20 @@ fn from_hdf5(path: &Path) -> Result<Format, ReadError> {
                     .xdmf file, or save it as .vtu with ParaView";
         ReadError::UnknownFormat { path: path.to_path_buf(), what: what.into(), known: KNOWN }
     })
+}
+
+/// Refuses files of stored meshes and volumes: they may be larger than memory.
+fn refuse_stored(path: &Path, head: &[u8]) -> Result<(), ReadError> {
+    let (format, cure) = if StoredMesh::recognizes(head) {
+        ("stored mesh", "draw it with `bench render`, or open it by `datasets::stored_mesh::open`")
+    } else if StoredVolume::recognizes(head) {
+        let cure = "draw it with `bench render`, or open it by `datasets::stored_volume::open`";
+        ("stored volume", cure)
+    } else {
+        return Ok(());
+    };
+    let what = "data that stay in their file";
+    Err(Fault::unsupported(At::Byte(0), what, cure).in_file(path, format))
 }
 
 /// True if the number of triangles in the header of a binary STL file matches its length.
