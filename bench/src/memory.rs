@@ -1,18 +1,61 @@
-//! Peak memory of a computation, counted where Rust allocates it.
+//! Peak memory of a computation, counted where Rust allocates it, and of an experiment, as the
+//! kernel counts it too.
 //!
 //! All of `bench` allocates through a counting allocator (crate peak_alloc: two atomic additions
-//! per call). The resident set size from the operating system is not suitable: the allocator keeps
-//! freed memory, so the second build of a run would appear to need none.
+//! per call). For one build, the resident set size from the operating system is not suitable: the
+//! allocator keeps freed memory, so the second build of a run would appear to need none.
 
 use peak_alloc::PeakAlloc;
+use serde::{Deserialize, Serialize};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 #[global_allocator]
 static HEAP: PeakAlloc = PeakAlloc;
+
+/// The highest peak since [`start`] that [`peak`] has reset.
+static HIGHEST: AtomicUsize = AtomicUsize::new(0);
+
+/// The most that this process held at a time, programs that it started apart.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct PeakMemory {
+    /// By Rust's allocator, in MB (10⁶ bytes).
+    pub allocated_mb: f64,
+    /// Resident, by the kernel (`VmHWM`), in MB: C libraries, the program, and what the allocator
+    /// keeps, too. `null` where the kernel does not tell.
+    pub resident_mb: Option<f64>,
+}
+
+/// Starts counting for [`since_start`].
+pub fn start() {
+    HIGHEST.store(0, Ordering::Relaxed);
+    HEAP.reset_peak_usage();
+    // "5" sets the peak to what is resident now (proc(5)). Where that is forbidden, an earlier
+    // experiment of the same run may have needed more.
+    let _ = std::fs::write("/proc/self/clear_refs", "5");
+}
+
+/// The peak since [`start`].
+pub fn since_start() -> PeakMemory {
+    let mb = |bytes: f64| (bytes / 1e5).round() / 10.0;
+    let allocated = HEAP.peak_usage().max(HIGHEST.load(Ordering::Relaxed));
+    PeakMemory {
+        allocated_mb: mb(allocated as f64),
+        resident_mb: resident_peak("/proc/self/status").map(|bytes| mb(bytes as f64)),
+    }
+}
+
+/// `VmHWM` of a process's status file, in bytes.
+pub fn resident_peak(status: &str) -> Option<u64> {
+    let status = std::fs::read_to_string(status).ok()?;
+    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
+    Some(line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()? * 1024)
+}
 
 /// Runs `work`. Returns its result, and the number of bytes by which the peak heap size exceeded
 /// the initial one. Other threads' memory is included; allocations of C libraries are not.
 pub fn peak<T>(work: impl FnOnce() -> T) -> (T, u64) {
     let start = HEAP.current_usage();
+    HIGHEST.fetch_max(HEAP.peak_usage(), Ordering::Relaxed);
     HEAP.reset_peak_usage();
     let value = work();
     (value, HEAP.peak_usage().saturating_sub(start) as u64)
@@ -23,7 +66,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_was_freed_again_counts_in_the_peak() {
+    fn what_was_freed_again_counts_in_the_peak_of_a_computation_and_of_the_experiment() {
+        start();
         let block = 256 << 20;
         for _ in 0..2 {
             let (sum, bytes) =
@@ -31,6 +75,13 @@ mod tests {
             assert_eq!(sum, block as u64 / 4096);
             // Other tests of this process allocate and free at the same time, far less than this.
             assert!(bytes.abs_diff(block as u64) < 64 << 20, "{bytes} B for a block of {block} B");
+        }
+        // What is measured in an experiment resets the allocator's own peak.
+        assert!(peak(|| ()).1 < 64 << 20);
+        let found = since_start();
+        assert!(found.allocated_mb > 256.0, "{found:?}");
+        if cfg!(target_os = "linux") {
+            assert!(found.resident_mb.is_some_and(|mb| mb > 256.0), "{found:?}");
         }
     }
 }

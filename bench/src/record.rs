@@ -5,6 +5,7 @@
 //! made from records alone, so old records can be shown again.
 
 use crate::machine::Machine;
+use crate::memory::PeakMemory;
 use crate::plot::Plot;
 use crate::runner::Ratio;
 use anyhow::Context as _;
@@ -96,6 +97,9 @@ pub struct Record {
     pub recorded_despite: Vec<String>,
     /// Wall time of the whole experiment, data and builds included.
     pub elapsed_secs: f64,
+    /// The most memory that it took; `null` in older records, and where nothing ran.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub peak_memory: Option<PeakMemory>,
     /// Descriptions of the columns.
     pub columns: Vec<Column>,
     /// The measurements.
@@ -129,6 +133,7 @@ impl Record {
             machine,
             recorded_despite: vec![],
             elapsed_secs: 0.0,
+            peak_memory: None,
             columns: vec![],
             rows: vec![],
             ratios: vec![],
@@ -172,6 +177,10 @@ impl Record {
         );
         s += &m.commit.as_ref().map_or("\n".into(), |c| format!(", commit {c}\n"));
         s += &m.load_1_min.map_or(String::new(), |l| format!("# load {l:.2} when it began\n"));
+        if let Some(PeakMemory { allocated_mb, resident_mb }) = self.peak_memory {
+            let resident = resident_mb.map_or("not known".into(), |mb| format!("{mb} MB"));
+            s += &format!("# peak memory {allocated_mb} MB allocated, {resident} resident\n");
+        }
         for doubt in self.doubts() {
             s += &format!("# in doubt: {}\n", one_line(&doubt));
         }

@@ -8,6 +8,7 @@ use datasets::generate::wavelet::Wavelet;
 use datasets::isosurface::{self, Options, PlaneSource as _};
 use datasets::stored_volume;
 use rayon::prelude::*;
+use rt_core::grid::Grid;
 use rt_core::mesh::TriMesh;
 use rt_core::stored_volume::{StoredVolumeReport, ValueType, VolumeLayout};
 use rt_core::volume::GridExtent;
@@ -44,6 +45,22 @@ pub fn store_mixing_layer(
         planes.iter().try_for_each(|plane| writer.add_plane(plane))?;
     }
     Ok((layout, stored_volume::finish(writer)?))
+}
+
+/// The mixing layer as [`store_mixing_layer`] stores it: rounded to bytes, in single precision.
+///
+/// # Errors
+/// When the points are more than a grid can have.
+pub fn mixing_layer_grid(points: u32) -> anyhow::Result<Grid> {
+    let layer = MixingLayer::new(points, SEED);
+    let dims = layer.dims();
+    let mut values = vec![0.0f32; dims.as_usizevec3().element_product()];
+    let planes = values.par_chunks_mut(dims.x as usize * dims.y as usize);
+    (0..dims.z).into_par_iter().zip(planes).for_each(|(z, plane)| {
+        layer.fill_plane(z, plane);
+        plane.iter_mut().for_each(|v| *v = (255.0 * *v).round());
+    });
+    Ok(Grid::new(dims, layer.origin(), layer.spacing(), values)?)
 }
 
 /// The interface of the mixing layer in pieces; see [`store_mixing_layer`] for the layer and for

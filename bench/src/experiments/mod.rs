@@ -52,7 +52,7 @@ mod test_section;
 use crate::machine::Machine;
 use crate::meshes::MeshScene;
 use crate::record::Record;
-use crate::{meshes, runner};
+use crate::{memory, meshes, runner};
 use datasets::cli::Interrupted;
 use datasets::generate::nested_wavelet::Size;
 use rt_core::mesh::TriMesh;
@@ -417,6 +417,7 @@ pub struct Outcome {
 /// Runs one experiment. If interrupted before its first row, returns [`Interrupted`].
 pub fn run(experiment: &Experiment, context: &mut Context<'_>) -> anyhow::Result<Outcome> {
     let start = Instant::now();
+    memory::start();
     let machine = Machine::describe();
     let Experiment { id, chapter, title, run } = *experiment;
     let mut record = Record::new(id, title, chapter, context.quick, machine);
@@ -435,6 +436,7 @@ pub fn run(experiment: &Experiment, context: &mut Context<'_>) -> anyhow::Result
         Err(e) => return Err(e.context(format!("experiment `{id}` failed"))),
     };
     record.elapsed_secs = start.elapsed().as_secs_f64();
+    record.peak_memory = Some(memory::since_start());
     let unexplained = record.unexplained_columns();
     anyhow::ensure!(
         unexplained.is_empty(),

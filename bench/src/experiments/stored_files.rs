@@ -1,25 +1,29 @@
-//! Data in files that may be larger than memory: an implicit isosurface of a volume of bytes, and a
-//! mesh in pages. `bench run --thesis stored-files` takes the dissertation's own sizes.
+//! Data in files that may be larger than memory: a volume of bytes, as an implicit isosurface and
+//! as a medium, and a mesh in pages. `bench run --thesis stored-files` takes the dissertation's
+//! own sizes.
 
 use super::Context;
 use crate::clock::Clock;
 use crate::image::framing::Framing;
 use crate::record::{Record, Row};
 use crate::runner::{Schedule, Variant, interleave};
-use crate::stored_data::{store_mixing_layer, wavelet_surfaces};
+use crate::stored_data::{mixing_layer_grid, store_mixing_layer, wavelet_surfaces};
 use anyhow::Context as _;
 use datasets::cache::MeshCache;
 use datasets::catalogue;
 use datasets::generate::mixing_layer::{self, MixingLayer};
 use datasets::view::View;
-use datasets::{stored_mesh, stored_volume};
+use datasets::{colormaps, stored_mesh, stored_volume};
 use rt_core::bvh::{BuildOptions, Geometry, Instance, PageUse, World};
 use rt_core::camera::Camera;
+use rt_core::effects::Effects;
 use rt_core::glam::{DAffine3, DVec3};
-use rt_core::render::{RenderOptions, render};
-use rt_core::scene::Scene;
+use rt_core::render::{RenderOptions, RenderOutput, render};
+use rt_core::scene::{Scene, SceneBuilder};
 use rt_core::shapes::{IsosurfaceNormals, Shape};
 use rt_core::stored_volume::StoredIsosurface;
+use rt_core::transfer_function::TransferFunction;
+use rt_core::volume::{Volume, VolumeOptions};
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -27,6 +31,8 @@ use std::time::Instant;
 
 /// Bytes of pages and bricks in memory.
 const BUDGET: usize = 6 << 30;
+/// Points along x of the largest layer that is drawn in memory too.
+const LARGEST_IN_MEMORY: u32 = 512;
 /// Bytes for triangles that wait to be stored.
 const STORING: usize = 4 << 30;
 
@@ -65,9 +71,13 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column("tree", "ms", "tree over the pages or bricks");
     record.column("view", "", "view of the data set");
     record.column("first_frame", "s", "the first frame of the view, which reads what it meets");
-    record.column("reads", "", "pages or bricks read since the file was opened");
+    record.column(
+        "reads",
+        "",
+        "pages or bricks read since the file was opened; parts made, of a medium",
+    );
     record.column("in_memory", "MB", "the most that they took");
-    record.column("covered", "", "pixels that show a surface");
+    record.column("covered", "", "pixels that show a surface, or some of a medium");
     record.column("time", "ms", "median over the rounds, wall time of a frame");
     record.column("time_low", "ms", "fastest round");
     record.column("time_high", "ms", "slowest round");
@@ -163,7 +173,7 @@ fn measure_layer(
     sizes: &Sizes,
 ) -> anyhow::Result<()> {
     let points = sizes.layer;
-    let name = format!("mixing layer, {points} points along x, bytes, isosurface of equal parts");
+    let name = format!("mixing layer, {points} points along x, bytes");
     let Opened { data, prepare_secs, open_secs } = open_or_make(
         &folder.layer(sizes),
         folder.is_kept,
@@ -176,20 +186,59 @@ fn measure_layer(
             Ok(())
         },
     )?;
-    let volume = Arc::new(data);
+    let file = Arc::new(data);
     let isovalue = (255.0 * mixing_layer::ISO) as f32;
     let normals = IsosurfaceNormals::Smooth;
-    let surface = StoredIsosurface::new(volume.clone(), &[isovalue], normals)?;
-    let report = volume.report();
+    let surface = StoredIsosurface::new(file.clone(), &[isovalue], normals)?;
+    let report = file.report();
     let row = Row::new()
-        .with("data", name.as_str())
         .with("elements", report.points)
         .with("file", report.bytes as f64 / 1e6)
         .with("bytes_per_element", report.bytes as f64 / report.points as f64)
         .with("open", open_secs * 1e3);
-    let row = prepare_secs.map_or(row.clone(), |secs| row.with("prepare", secs));
+    let row = row.with("data", format!("{name}, isosurface of equal parts"));
+    let prepared = prepare_secs.map_or(row.clone(), |secs| row.clone().with("prepare", secs));
     let views = MixingLayer::views();
-    frames(context, record, sizes, Arc::new(surface), &views, &row, &|| volume.page_use())
+    let surface = Pictured::shape(Arc::new(surface))?;
+    let cameras = surface.cameras(&views, sizes)?;
+    let used = || file.page_use();
+    let timed = Timed { pictured: &surface, row: prepared, used: Some(&used) };
+    frames(context, record, sizes, &[timed], &cameras)?;
+
+    let row = row.with("data", format!("{name}, medium"));
+    let medium = Arc::new(medium_of(|transfer, options| {
+        Ok(Volume::stored(file.clone(), BUDGET, transfer, options)?)
+    })?);
+    let in_file = Pictured::medium(medium.clone())?;
+    let cameras = in_file.cameras(&views, sizes)?;
+    let used = || medium.page_use().unwrap_or_else(|| file.page_use());
+    let mut timed = vec![Timed { pictured: &in_file, row, used: Some(&used) }];
+    let in_memory = match sizes.layer <= LARGEST_IN_MEMORY {
+        true => {
+            context.report_step("the same in memory")?;
+            let grid = Arc::new(mixing_layer_grid(points)?);
+            let medium = medium_of(|transfer, options| Ok(Volume::new(grid, transfer, options)?))?;
+            Some(Pictured::medium(Arc::new(medium))?)
+        }
+        false => None,
+    };
+    if let Some(pictured) = &in_memory {
+        let row = Row::new()
+            .with("data", format!("{name}, medium in memory in single precision"))
+            .with("elements", report.points);
+        timed.push(Timed { pictured, row, used: None });
+    }
+    frames(context, record, sizes, &timed, &cameras)
+}
+
+/// A veil around the interface between the halves of the layer.
+fn medium_of(
+    make: impl FnOnce(TransferFunction, VolumeOptions) -> anyhow::Result<Volume>,
+) -> anyhow::Result<Volume> {
+    let range = [0.0, 255.0];
+    let colors = colormaps::by_name("viridis", range).context("a colour map that exists")?;
+    let opacity = [[100.0, 0.0], [127.5, 0.9], [155.0, 0.0]];
+    make(TransferFunction::from_opacity(colors, &opacity, 0.1)?, VolumeOptions::default())
 }
 
 fn measure_wavelet(
@@ -226,61 +275,95 @@ fn measure_wavelet(
         .with("open", open_secs * 1e3);
     let row = prepare_secs.map_or(row.clone(), |secs| row.with("prepare", secs));
     let views = catalogue::find("wavelet")?.views();
-    frames(context, record, sizes, mesh.clone(), &views, &row, &|| mesh.page_use())
+    let pictured = Pictured::shape(mesh.clone())?;
+    let cameras = pictured.cameras(&views, sizes)?;
+    let used = || mesh.page_use();
+    let timed = Timed { pictured: &pictured, row, used: Some(&used) };
+    frames(context, record, sizes, &[timed], &cameras)
 }
 
-/// Frames of all views in turns, after a first one of each.
+/// A scene, and how long its tree took.
+struct Pictured {
+    scene: Scene,
+    effects: Effects,
+    tree_secs: Option<f64>,
+}
+
+impl Pictured {
+    fn shape(shape: Arc<dyn Shape>) -> anyhow::Result<Pictured> {
+        let start = Instant::now();
+        let placed = Instance { geometry: 0, world_from_object: DAffine3::IDENTITY };
+        let geometry = vec![Geometry::Shape(shape)];
+        let scene = Scene::new(World::build(geometry, vec![placed], &BuildOptions::default())?);
+        let tree_secs = Some(start.elapsed().as_secs_f64());
+        Ok(Pictured { scene, effects: Effects::NONE, tree_secs })
+    }
+
+    fn medium(volume: Arc<Volume>) -> anyhow::Result<Pictured> {
+        let mut scene = SceneBuilder::new();
+        scene.volume(volume);
+        Ok(Pictured { scene: scene.build()?, effects: Effects::VOLUMES, tree_secs: None })
+    }
+
+    fn cameras(&self, views: &[View], sizes: &Sizes) -> anyhow::Result<Vec<(String, Camera)>> {
+        let camera = |view: &View| {
+            let camera = Framing::At(view.clone()).of_scene(&self.scene, [sizes.pixels; 2])?;
+            Ok((view.name.clone(), camera))
+        };
+        views.iter().map(camera).collect()
+    }
+}
+
+/// What is measured, with what its rows have in common.
+struct Timed<'a> {
+    pictured: &'a Pictured,
+    row: Row,
+    /// What of a file is in memory.
+    used: Option<&'a dyn Fn() -> PageUse>,
+}
+
+/// Frames of all views of all of them in turns, after a first one of each.
 fn frames(
     context: &mut Context<'_>,
     record: &mut Record,
     sizes: &Sizes,
-    shape: Arc<dyn Shape>,
-    views: &[View],
-    row: &Row,
-    used: &dyn Fn() -> PageUse,
+    all: &[Timed<'_>],
+    cameras: &[(String, Camera)],
 ) -> anyhow::Result<()> {
-    let start = Instant::now();
-    let placed = Instance { geometry: 0, world_from_object: DAffine3::IDENTITY };
-    let geometry = vec![Geometry::Shape(shape)];
-    let scene = Scene::new(World::build(geometry, vec![placed], &BuildOptions::default())?);
-    let tree_secs = start.elapsed().as_secs_f64();
-    let options = RenderOptions::new(sizes.pixels, sizes.pixels);
-    let mut cameras: Vec<(&str, Camera)> = vec![];
-    let mut rows = vec![];
-    for view in views {
-        context.report_step(format!("first frame of {}", view.name))?;
-        let camera = Framing::At(view.clone()).of(&scene.world, [sizes.pixels; 2])?;
+    let failed: RefCell<Option<anyhow::Error>> = RefCell::new(None);
+    let (mut rows, mut variants) = (vec![], vec![]);
+    for (timed, (name, camera)) in all.iter().flat_map(|t| cameras.iter().map(move |c| (t, c))) {
+        context.report_step(format!("first frame of {name}"))?;
+        let (scene, effects) = (&timed.pictured.scene, Some(timed.pictured.effects));
+        let options = RenderOptions { effects, ..RenderOptions::new(sizes.pixels, sizes.pixels) };
+        let covered =
+            |output: &RenderOutput| output.frame.color.iter().filter(|c| c[3] > 0.0).count() as u64;
         let start = Instant::now();
-        let output = render(&scene, &camera, &options)?;
+        let output = render(scene, camera, &options)?;
         let first_secs = start.elapsed().as_secs_f64();
-        let pages = used();
-        let covered = output.frame.color.iter().filter(|c| c[3] > 0.0).count();
-        rows.push(
-            row.clone()
-                .with("tree", tree_secs * 1e3)
-                .with("view", view.name.as_str())
-                .with("first_frame", first_secs)
-                .with("reads", pages.reads)
-                .with("in_memory", pages.peak as f64 / 1e6)
-                .with("covered", covered),
-        );
-        cameras.push((view.name.as_str(), camera));
+        let mut row = timed
+            .row
+            .clone()
+            .with("view", name.as_str())
+            .with("first_frame", first_secs)
+            .with("covered", covered(&output));
+        if let Some(secs) = timed.pictured.tree_secs {
+            row = row.with("tree", secs * 1e3);
+        }
+        if let Some(pages) = timed.used.map(|used| used()) {
+            row = row.with("reads", pages.reads).with("in_memory", pages.peak as f64 / 1e6);
+        }
+        rows.push(row);
+        let failed = &failed;
+        variants.push(Variant::new(name.clone(), move || match render(scene, camera, &options) {
+            Ok(output) => covered(&output),
+            Err(e) => {
+                failed.borrow_mut().get_or_insert(e.into());
+                0
+            }
+        }));
     }
     context.report_step("frames in turns")?;
-    let failed: RefCell<Option<anyhow::Error>> = RefCell::new(None);
-    let mut variants: Vec<Variant<'_>> = cameras
-        .iter()
-        .map(|(name, camera)| {
-            let (scene, options, failed) = (&scene, &options, &failed);
-            Variant::new(*name, move || match render(scene, camera, options) {
-                Ok(output) => output.frame.color.iter().filter(|c| c[3] > 0.0).count() as u64,
-                Err(e) => {
-                    failed.borrow_mut().get_or_insert(e.into());
-                    0
-                }
-            })
-        })
-        .collect();
     let timings = interleave(&context.schedule(Schedule::all_threads(), 4.0), &mut variants)?;
     drop(variants);
     if let Some(error) = failed.into_inner() {

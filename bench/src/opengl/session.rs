@@ -216,9 +216,7 @@ impl Session {
 
     /// Peak memory of the program, in bytes.
     pub fn peak_bytes(&self) -> Option<u64> {
-        let status = std::fs::read_to_string(format!("/proc/{}/status", self.pid)).ok()?;
-        let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
-        Some(line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()? * 1024)
+        crate::memory::resident_peak(&format!("/proc/{}/status", self.pid))
     }
 
     /// Ends the program; returns gluray's report if the program ran through it.

@@ -66,9 +66,10 @@ fn section(r: &Record) -> String {
     let m = &r.machine;
     let load = m.load_1_min.map_or("load not known".into(), |l| format!("load {l:.2}"));
     s += &format!(
-        "<p class=\"when\">{form}{}, took {:.1} s; {load} on {} cores when it began.</p>\n",
+        "<p class=\"when\">{form}{}, took {:.1} s{}; {load} on {} cores when it began.</p>\n",
         escape(&m.date),
         r.elapsed_secs,
+        r.peak_memory.map_or(String::new(), |p| format!(" and {} MB", p.allocated_mb)),
         m.cores
     );
     if !r.recorded_despite.is_empty() {
