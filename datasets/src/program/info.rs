@@ -46,8 +46,8 @@ pub(super) fn info(common: CommonArgs, args: &InfoArgs) -> anyhow::Result<()> {
 }
 
 fn print(common: CommonArgs, mut info: Info) -> anyhow::Result<()> {
-    let points = info.parts.iter().map(|p| p.points);
-    info.points = points.fold(Some(0), |sum: Option<u64>, n| Some(sum?.saturating_add(n?)));
+    let mut points = info.parts.iter().map(|p| p.points);
+    info.points = points.try_fold(0, |sum: u64, n| Some(sum.saturating_add(n?)));
     info.cells = info.parts.iter().fold(0, |sum, p| sum.saturating_add(p.cells));
     common.result(&info, || text(&info))
 }
