@@ -88,7 +88,8 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         "Frames of {pixels} x {pixels} pixels through the renderer: a primary ray a pixel, \
          headlight, all threads, the views in turns; media a quarter as wide and high. At most \
          {budget} MB of pages or bricks are in memory. The files were written just before, or read \
-         before, so the system may have parts of them in memory: the first frame is not that of a cold disk."
+         before, so the system may have parts of them in memory: the first frame is not that of a \
+         cold disk."
     ));
     if context.thesis {
         record.notes.push("The sizes of the dissertation (--thesis).".into());
