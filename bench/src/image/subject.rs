@@ -278,6 +278,12 @@ impl Subject {
             let (lo, hi) = range.context("no value is finite: as a volume it would be empty")?;
             subject.contents.push(format!("volume of {} points", volume.report().points));
             subject.extend_scalar_range(&[lo, hi]);
+            let non_finite = volume.report().non_finite;
+            if non_finite > 0 && isovalue.is_none() {
+                subject.warnings.push(format!(
+                    "{non_finite} values are not finite: the cells around them are transparent"
+                ));
+            }
             let values = FieldValues::Stored { volume: volume.clone(), memory };
             subject.volume = Some(VolumeField { values, range: [lo, hi] });
             if isovalue.is_none() {

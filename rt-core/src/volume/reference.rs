@@ -7,7 +7,8 @@ use glam::{DVec3, UVec3};
 
 /// Premultiplied linear colour and opacity between `t0` and `t1`, by the midpoint rule with steps
 /// of `step_voxels` of the smallest grid spacing. The error decreases with the square of the step.
-/// Shading is not included.
+/// Shading is not included. Of volumes in memory alone: a part or a stored volume has other points
+/// than its extent.
 pub fn integrate_reference(
     volume: &Volume,
     ray: &Ray,

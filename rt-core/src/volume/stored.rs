@@ -104,10 +104,9 @@ fn brick_blocks(brick: UVec3, bricks: UVec3, blocks: UVec3) -> Brick {
 
 impl Volume {
     /// A volume whose values stay in a file and are read where rays meet them, for more points than
-    /// memory holds. Results are those of [`Volume::new`] of the same values, bit for bit. What a
-    /// ray passes in single precision takes at most `budget` bytes, and the last 16 parts of each
-    /// thread besides; a part has the 32³ cells of a brick and takes 0.2 MB. `source` has a budget
-    /// of its own.
+    /// memory holds. Results are those of [`Volume::new`] of the same values, bit for bit. Rays go
+    /// through parts in single precision, each of a brick's 32³ cells and 0.2 MB. They take at most
+    /// `budget` bytes, and the last 16 parts of each thread besides; `source` has its own budget.
     ///
     /// Values that cannot be read count as NaN, which is transparent, and a render fails with the
     /// reason ([`Volume::failure`]). [`Volume::grid`] has one point only, and [`Volume::report`]
