@@ -92,12 +92,28 @@ pub fn extract(
     isos: &[f64],
     options: Options,
 ) -> Result<Isosurfaces, IsosurfaceError> {
-    let placement = Placement::of(
+    extract_at(grid, isos, options, None)
+}
+
+/// [`extract`] with positions relative to `origin`; without it, to one that is chosen for them.
+/// Pieces of one surface want one origin: relative to several, a point on their border would be
+/// rounded in several ways, and rays could pass between them.
+pub fn extract_at(
+    grid: &Grid,
+    isos: &[f64],
+    options: Options,
+    origin: Option<DVec3>,
+) -> Result<Isosurfaces, IsosurfaceError> {
+    let mut placement = Placement::of(
         grid.dims().as_u64vec3(),
         grid.origin(),
         grid.spacing(),
         grid.values().len(),
     )?;
+    if let Some(origin) = origin {
+        placement.mesh_origin = origin;
+        placement.base = grid.origin() - origin;
+    }
     let mut result = Isosurfaces { triangles_per_iso: vec![0; isos.len()], ..Default::default() };
     result.mesh.origin = placement.mesh_origin;
     let cuts = cuts(isos, &placement)?;

@@ -9,6 +9,8 @@ use std::ffi::{c_int, c_void};
 use std::rc::Rc;
 use std::time::{Duration, Instant};
 
+/// The state of MPI before `MPI_Init`.
+const NOT_STARTED: &str = "not started";
 /// `MPI_THREAD_SERIALIZED` in all three ABIs.
 const SERIALIZED: c_int = 2;
 /// The names of the levels below it.
@@ -86,6 +88,27 @@ impl MpiComm {
         };
         // SAFETY: the caller's promise.
         unsafe { Self::over(mpi, handle) }
+    }
+
+    /// All ranks of the program that this library is part of (`MPI_COMM_WORLD`); `None` where it
+    /// has not started MPI. All of them call this together.
+    ///
+    /// # Errors
+    /// As [`from_handle`](Self::from_handle).
+    pub fn of_program() -> Result<Option<Self>, MpiError> {
+        let mpi = match running() {
+            Ok(mpi) => mpi,
+            Err(
+                MpiError::NotLaunched
+                | MpiError::NoLibrary { .. }
+                | MpiError::NotRunning { state: NOT_STARTED, .. },
+            ) => return Ok(None),
+            Err(error) => return Err(error),
+        };
+        let world = mpi.world;
+        // SAFETY: the world of the MPI that runs; that all ranks call is the contract above, and
+        // without it they wait until their time is up.
+        unsafe { Self::over(mpi, world) }.map(Some)
     }
 
     /// # Safety
@@ -180,7 +203,7 @@ fn check_running(mpi: &Mpi) -> Result<(), MpiError> {
     mpi.checked("MPI_Initialized", code)?;
     let library = mpi.version.lines().next().unwrap_or_default().to_owned();
     if initialized == 0 {
-        return Err(MpiError::NotRunning { state: "not started", library });
+        return Err(MpiError::NotRunning { state: NOT_STARTED, library });
     }
     if is_finalized(mpi) {
         return Err(MpiError::NotRunning { state: "ended", library });
