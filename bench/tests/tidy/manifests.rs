@@ -25,6 +25,7 @@ const ALLOWED_DEPENDENCIES: &[(&str, May, &[&str])] = &[
     ("schlieren-python", May::Use, &["schlieren", "datasets", "rt-core-python-work"]),
     ("composite", May::UseBehindAFeature, &["rt-core", "datasets", "schlieren"]),
     ("composite-capi", May::Use, &["composite", "rt-core", "schlieren"]),
+    ("composite-catalyst", May::Use, &["composite", "rt-core", "datasets", "schlieren"]),
     ("gluray", May::Use, &["rt-core", "composite", "datasets"]),
     // For the tests alone: they run programs with the shared library.
     ("gluray", May::UseBehindAFeature, &["gluray-interposer"]),

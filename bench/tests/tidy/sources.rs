@@ -23,6 +23,7 @@ pub(crate) const UNSAFE_MODULES: &[(&str, &str)] = &[
     ),
     ("composite/src/comm/mpi", "calls into an MPI library found at run time"),
     ("composite/capi/src/capi", "the C ABI for programs with MPI"),
+    ("composite/catalyst/src/api", "Catalyst's functions, and Conduit's nodes in a simulation"),
     (
         "composite/src/icet",
         "calls into IceT, found at run time; a comparison with IceT is a call into it",

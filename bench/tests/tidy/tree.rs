@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Members that lie in the folder of another.
-const INNER_MEMBERS: &[&str] = &["gluray/interposer", "composite/capi"];
+const INNER_MEMBERS: &[&str] = &["gluray/interposer", "composite/capi", "composite/catalyst"];
 
 /// A text file of the workspace.
 #[derive(Debug, Clone)]

@@ -60,7 +60,7 @@ pub(super) fn pack(
     shared(tree, &stage)?;
 
     let programs = PROGRAMS.iter().map(|p| tree.join("bin").join(p));
-    let files = programs.chain(LIBRARIES.iter().map(|l| tree.join("lib").join(l)));
+    let files = programs.chain(LIBRARIES.iter().map(|(_, l)| tree.join("lib").join(l)));
     let depends = depends::of(&files.collect::<Vec<_>>())?;
     let control = control(version, maintainer, &depends, kilobytes(&stage)?);
     write(&stage.join("DEBIAN/control"), &control)?;

@@ -4,6 +4,7 @@
 //! TREE/bin          the programs                          (deb: links in /usr/bin)
 //! TREE/lib          libgluray.so and libvtk_bridge.so     (the programs look in ../lib)
 //!                   librtsv_composite.so, with a file for pkg-config
+//!                   catalyst/libcatalyst-rtsv.so          (Catalyst looks for it by this name)
 //! TREE/python       rtvtk, for the wheel of VTK           (deb: a link in Python's folder)
 //!                   rtsv_composite.py                     (deb: likewise)
 //! TREE/include      the C interfaces of vtk-bridge and of composite, the latter for Fortran too
@@ -29,8 +30,14 @@ use std::process::{Command, Stdio};
 /// The programs, and the member that builds each.
 const PROGRAMS: &[&str] = &["gluray", "schlieren", "composite", "vtk-bridge", "datasets", "bench"];
 
-/// The shared libraries, built by members `gluray-interposer`, `vtk-bridge` and `composite-capi`.
-const LIBRARIES: &[&str] = &["libgluray.so", "libvtk_bridge.so", COMPOSITE];
+/// The shared libraries as cargo names them, built by members `gluray-interposer`, `vtk-bridge`,
+/// `composite-capi` and `composite-catalyst`, and their files in `lib`.
+const LIBRARIES: &[(&str, &str)] = &[
+    ("libgluray.so", "libgluray.so"),
+    ("libvtk_bridge.so", "libvtk_bridge.so"),
+    (COMPOSITE, COMPOSITE),
+    ("libcatalyst_rtsv.so", "catalyst/libcatalyst-rtsv.so"),
+];
 
 /// The C interface of composite. Programs are linked with this name, and ask for the one with the
 /// number of the interface when they run.
@@ -43,6 +50,7 @@ const MEMBERS: &[&str] = &[
     "schlieren",
     "composite",
     "composite-capi",
+    "composite-catalyst",
     "vtk-bridge",
     "datasets",
     "bench",
@@ -50,7 +58,7 @@ const MEMBERS: &[&str] = &[
 
 /// Members that build a library alone.
 #[cfg(test)]
-const WITHOUT_PROGRAM: &[&str] = &["gluray-interposer", "composite-capi"];
+const WITHOUT_PROGRAM: &[&str] = &["gluray-interposer", "composite-capi", "composite-catalyst"];
 
 /// The shells with completions: name for the program's subcommand, folder below `share`, and what
 /// goes before and behind the program's name.
@@ -134,10 +142,10 @@ fn fill(root: &Path, built: &Path, tree: &Path, version: &str) -> Result<(), Str
         copy(&built.join(program), &bin.join(program))?;
         run_in(tree, "strip", &[&format!("bin/{program}")])?;
     }
-    for library in LIBRARIES {
-        copy(&built.join(library), &lib.join(library))?;
+    for (library, file) in LIBRARIES {
+        copy(&built.join(library), &lib.join(file))?;
         // What programs look up by name stays.
-        run_in(tree, "strip", &["--strip-unneeded", &format!("lib/{library}")])?;
+        run_in(tree, "strip", &["--strip-unneeded", &format!("lib/{file}")])?;
     }
     copy(&root.join("vtk-bridge/include/rtv.h"), &tree.join("include/rtv.h"))?;
     interface_of_composite(root, tree, version)?;

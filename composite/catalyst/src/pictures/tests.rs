@@ -1,0 +1,228 @@
+//! Pictures of the same gas in one domain and in several, on one rank and on several.
+
+use super::*;
+use crate::settings::{Between, Settings};
+use composite::{Communicator, threads};
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// Points along each axis.
+const N: usize = 16;
+
+fn value([x, y, z]: [usize; 3]) -> f64 {
+    let at = |k: usize| (k as f64 / (N - 1) as f64 - 0.5).powi(2);
+    1.2 - 0.6 * (-12.0 * (at(x) + at(y) + at(z))).exp()
+}
+
+/// A slab of planes of the lattice.
+struct Slab {
+    values: Vec<f64>,
+    numbers: [Vec<f64>; 7],
+}
+
+impl Slab {
+    fn new(planes: std::ops::Range<usize>) -> Slab {
+        let point = |k: usize| [k % N, k / N % N, planes.start + k / (N * N)];
+        let values = (0..N * N * planes.len()).map(|k| value(point(k))).collect();
+        let h = 1.0 / (N - 1) as f64;
+        let one = |v: f64| vec![v];
+        let numbers = [
+            one(N as f64),
+            one(N as f64),
+            one(planes.len() as f64),
+            one(planes.start as f64 * h),
+            one(h),
+            one(h),
+            one(h),
+        ];
+        Slab { values, numbers }
+    }
+
+    fn mesh(&self) -> Node<'_> {
+        const NAMES: [&str; 7] =
+            ["dims/i", "dims/j", "dims/k", "origin/z", "spacing/dx", "spacing/dy", "spacing/dz"];
+        let mut mesh = Node::default();
+        mesh.set("coordsets/c/type", "uniform".into());
+        for (name, number) in NAMES.iter().zip(&self.numbers) {
+            mesh.set(&format!("coordsets/c/{name}"), Node::from(&number[..]));
+        }
+        mesh.set("topologies/t/type", "uniform".into());
+        mesh.set("topologies/t/coordset", "c".into());
+        mesh.set("fields/density/association", "vertex".into());
+        mesh.set("fields/density/topology", "t".into());
+        mesh.set("fields/density/values", Node::from(&self.values[..]));
+        mesh
+    }
+}
+
+/// Slabs of `parts` parts, with `ghosts` planes of the neighbours.
+fn slabs(parts: usize, ghosts: usize) -> Vec<Slab> {
+    let slab = |k: usize| {
+        let (a, b) = (N * k / parts, N * (k + 1) / parts);
+        Slab::new(a.saturating_sub(ghosts)..(b + ghosts).min(N))
+    };
+    (0..parts).map(slab).collect()
+}
+
+fn params<'a>(slabs: &'a [&Slab]) -> Node<'a> {
+    let mut params = Node::default();
+    params.set("catalyst/channels/gas/type", "multimesh".into());
+    params.set("catalyst/channels/gas/data", Node::Children(Vec::new()));
+    for (k, slab) in slabs.iter().enumerate() {
+        params.set(&format!("catalyst/channels/gas/data/{k}"), slab.mesh());
+    }
+    params
+}
+
+fn file(name: &str) -> PathBuf {
+    let folder = std::env::temp_dir().join("catalyst-rtsv-tests");
+    std::fs::create_dir_all(&folder).expect("a folder");
+    folder.join(format!("{}-{name}.png", std::process::id()))
+}
+
+/// Makes something on `ranks` ranks, of which rank r has the slabs r, r + ranks, ...
+fn made(
+    ranks: usize,
+    slabs: &[Slab],
+    make: impl Fn(&mut Group<'_>, &Node<'_>) -> Result<Vec<String>, PictureError> + Sync,
+) -> Vec<Result<Vec<String>, String>> {
+    let outputs = threads::run(ranks, |mut comm| {
+        let own: Vec<&Slab> = slabs.iter().skip(comm.rank()).step_by(ranks).collect();
+        let mut group = Group { comm: &mut comm, timeout: Duration::from_secs(60) };
+        make(&mut group, &params(&own)).map_err(|e| e.to_string())
+    });
+    outputs.into_iter().map(|o| o.expect("no rank panics")).collect()
+}
+
+fn settings(text: &str) -> Settings {
+    Settings::parse(text, Path::new("test.toml")).expect("settings")
+}
+
+fn bytes_of(name: &str, ranks: usize, slabs: &[Slab], wanted: &Picture) -> Vec<u8> {
+    let file = file(name);
+    for output in made(ranks, slabs, |group, params| picture(group, params, wanted, &file)) {
+        output.expect(name);
+    }
+    let bytes = std::fs::read(&file).expect(name);
+    std::fs::remove_file(&file).expect(name);
+    bytes
+}
+
+#[test]
+fn pictures_have_the_bytes_of_one_process() {
+    let text = "
+        [[picture]]
+        show = \"volume\"
+        array = \"density\"
+        size = [40, 30]
+        [[picture]]
+        show = \"isosurface\"
+        array = \"density\"
+        isovalues = [0.8, 1.0]
+        size = [40, 30]
+        opacity = 0.5
+        middle = [0.5, 0.5, 0.5]
+        radius = 0.5";
+    for (k, wanted) in settings(text).picture.iter().enumerate() {
+        let name = |ranks: usize, parts: usize| format!("{k}-{ranks}-{parts}");
+        let one = bytes_of(&name(1, 1), 1, &slabs(1, 0), wanted);
+        for (ranks, parts) in [(1, 3), (2, 2), (3, 5), (5, 3)] {
+            let cut = cut_at_shared_planes(parts);
+            let many = bytes_of(&name(ranks, parts), ranks, &cut, wanted);
+            assert!(one == many, "{:?} on {ranks} ranks in {parts} domains", wanted.show);
+        }
+    }
+}
+
+/// Slabs that share the plane between them, as domains of cells do.
+fn cut_at_shared_planes(parts: usize) -> Vec<Slab> {
+    let end = |k: usize| (N - 1) * k / parts;
+    (0..parts).map(|k| Slab::new(end(k)..end(k + 1) + 1)).collect()
+}
+
+#[test]
+fn photographs_have_the_bytes_of_one_process() {
+    let text = "[[photograph]]\nsize = [24, 20]\ndirection = [1, 0, 0]\nup = [0, 0, 1]";
+    let wanted = settings(text).photograph.remove(0);
+    let bytes = |ranks: usize, slabs: &[Slab], wanted: &Photograph| {
+        let file = file(&format!("photograph-{ranks}"));
+        for output in made(ranks, slabs, |group, params| photograph(group, params, wanted, &file)) {
+            output.expect("a photograph");
+        }
+        let bytes = std::fs::read(&file).expect("the file");
+        std::fs::remove_file(&file).expect("the file");
+        bytes
+    };
+    let one = bytes(1, &slabs(1, 0), &wanted);
+    for ranks in [2, 3] {
+        assert!(one == bytes(ranks, &slabs(ranks, 2), &wanted), "{ranks} ranks");
+    }
+    // Without planes of the neighbours, the reason is said on all ranks, and linear interpolation
+    // does without.
+    let shared = cut_at_shared_planes(2);
+    let file = file("photograph-none");
+    for output in made(2, &shared, |group, params| photograph(group, params, &wanted, &file)) {
+        let said = output.expect_err("no layers");
+        assert!(said.contains("one more layer of nodes"), "{said}");
+    }
+    let linear = Photograph { interpolant: Between::Trilinear, ..wanted };
+    assert!(bytes(1, &slabs(1, 0), &linear) == bytes(2, &shared, &linear));
+}
+
+#[test]
+fn surfaces_of_all_domains_are_drawn_and_coloured() {
+    let wanted = settings("[[picture]]\narray = \"density\"\nsize = [40, 30]").picture.remove(0);
+    let one = bytes_of("surface-1", 1, &slabs(1, 0), &wanted);
+    let many = bytes_of("surface-3", 3, &cut_at_shared_planes(5), &wanted);
+    assert!(one == many);
+    let grey = bytes_of("surface-grey", 1, &slabs(1, 0), &Picture { array: None, ..wanted });
+    assert!(one != grey);
+}
+
+#[test]
+fn a_rank_with_what_cannot_be_drawn_is_named_on_all() {
+    let file = file("faults");
+    let all = slabs(2, 0);
+    let cases = [
+        ("[[picture]]\narray = \"pressure\"", "rank 0: no array `pressure`"),
+        ("[[picture]]\nchannel = \"solid\"", "there is no channel `solid`; there are: gas"),
+        ("[[picture]]\nshow = \"volume\"\narray = \"p\"", "an array (there are: density)"),
+        ("[[picture]]\ntopology = \"main\"", "there is no topology `main`; there are: t"),
+    ];
+    for (text, part) in cases {
+        let wanted = settings(text).picture.remove(0);
+        for output in made(2, &all, |group, params| picture(group, params, &wanted, &file)) {
+            let said = output.expect_err(text);
+            assert!(said.contains(part), "{text}: {said}");
+        }
+    }
+    // A folder that is not there.
+    let wanted = settings("[[picture]]\nsize = [8, 8]").picture.remove(0);
+    let nowhere = Path::new("/nowhere/at/all.png");
+    for output in made(2, &all, |group, params| picture(group, params, &wanted, nowhere)) {
+        assert!(output.expect_err("no folder").contains("/nowhere/at"));
+    }
+}
+
+#[test]
+fn domains_off_the_lattice_are_refused() {
+    let mut all = slabs(2, 0);
+    all[1].numbers[3][0] += 0.01;
+    let text = "[[picture]]\nshow = \"volume\"\narray = \"density\"\nsize = [8, 8]";
+    let wanted = settings(text).picture.remove(0);
+    let file = file("off");
+    for output in made(2, &all, |group, params| picture(group, params, &wanted, &file)) {
+        let said = output.expect_err("off the lattice");
+        assert!(said.contains("a domain of rank 1 begins at") && said.contains("steps"), "{said}");
+    }
+}
+
+#[test]
+fn a_simulation_without_cells_has_an_empty_picture() {
+    let wanted = settings("[[picture]]\nsize = [8, 8]").picture.remove(0);
+    let file = file("empty");
+    let outputs = made(2, &[], |group, params| picture(group, params, &wanted, &file));
+    let warnings: Vec<String> = outputs.into_iter().flat_map(|o| o.expect("a picture")).collect();
+    assert!(warnings.len() == 1 && warnings[0].contains("nothing is to be seen"), "{warnings:?}");
+    std::fs::remove_file(file).expect("the picture");
+}
