@@ -67,6 +67,8 @@ pub struct Session {
     written: Vec<PathBuf>,
     /// Warnings so far, each once.
     warnings: BTreeSet<String>,
+    /// Those that nobody was told yet.
+    unsaid: Vec<String>,
     /// Why the group of ranks has ended, if it has.
     ended: Option<String>,
 }
@@ -112,6 +114,7 @@ impl Session {
             calls: 0,
             written: Vec::new(),
             warnings: BTreeSet::new(),
+            unsaid: Vec::new(),
             ended: None,
         })
     }
@@ -152,7 +155,9 @@ impl Session {
     }
 
     fn group(&mut self) -> Group<'_> {
-        Group { comm: &mut *self.comm, timeout: self.timeout }
+        // A rank of many is one processor of its machine; a simulation without ranks has all.
+        let threads = self.settings.threads.unwrap_or(self.comm.size() == 1);
+        Group { comm: &mut *self.comm, timeout: self.timeout, threads }
     }
 
     fn note(
@@ -181,7 +186,11 @@ impl Session {
     }
 
     fn warn(&mut self, warnings: Vec<String>) {
-        self.warnings.extend(warnings);
+        for warning in warnings {
+            if self.warnings.insert(warning.clone()) {
+                self.unsaid.push(warning);
+            }
+        }
     }
 
     /// This rank.
@@ -202,6 +211,11 @@ impl Session {
     /// The files of the last call, which rank 0 has written.
     pub fn written(&self) -> &[PathBuf] {
         &self.written
+    }
+
+    /// This rank's warnings since this was called last, each once in a session.
+    pub fn take_new_warnings(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.unsaid)
     }
 
     /// This rank's warnings of all calls, each once.
@@ -227,6 +241,9 @@ fn settings_file(
                 "catalyst/scripts/{name}: {path} is not run: it is no file of settings (.toml)"
             ));
         }
+    }
+    for (name, _) in params.get("catalyst/pipelines").map_or(&[][..], Node::children) {
+        warnings.push(format!("catalyst/pipelines/{name} is not run: pipelines are ParaView's"));
     }
     (file, warnings)
 }
@@ -260,7 +277,9 @@ mod tests {
         let mut params = Node::default();
         params.set("catalyst/scripts/a/filename", "pipeline.py".into());
         params.set("catalyst/scripts/b", "pictures.toml".into());
+        params.set("catalyst/pipelines/0/type", "io".into());
         let (file, warnings) = settings_file(&params, None);
+        assert!(warnings[1].contains("pipelines/0 is not run"), "{warnings:?}");
         assert_eq!(file, Some("pictures.toml".into()));
         assert!(warnings[0].contains("scripts/a: pipeline.py is not run"), "{warnings:?}");
         let (file, _) = settings_file(&params, Some("mine.toml".into()));

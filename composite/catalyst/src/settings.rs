@@ -17,6 +17,9 @@ pub struct Settings {
     pub quiet: bool,
     /// Longest wait for another rank that gives no sign of life, seconds.
     pub timeout_secs: Option<f64>,
+    /// Whether a rank uses all processors that it may; without it, one of many ranks uses one, and
+    /// a rank alone all.
+    pub threads: Option<bool>,
     /// Ray traced pictures.
     pub picture: Vec<Picture>,
     /// Photographs of light that the density of a gas bends.
@@ -29,7 +32,7 @@ pub struct Settings {
 pub struct Picture {
     /// The file: `.png`, or `.exr` with depths; `{step}` and `{time}` are replaced.
     pub file: String,
-    /// Calls from one picture to the next: 1 for all.
+    /// Calls from one picture to the next, which is made at the first: 1 for all.
     pub every: u64,
     /// The channel; without it, the first.
     pub channel: Option<String>,
@@ -85,7 +88,7 @@ pub enum Show {
 pub struct Photograph {
     /// The file: `.png` or `.exr`; `{step}` and `{time}` are replaced.
     pub file: String,
-    /// Calls from one photograph to the next: 1 for all.
+    /// Calls from one photograph to the next, which is made at the first: 1 for all.
     pub every: u64,
     /// The channel; without it, the first.
     pub channel: Option<String>,

@@ -136,11 +136,12 @@ fn with_session<R>(f: impl FnOnce(&mut Session) -> Result<R, Failure>) -> Result
 }
 
 /// Says what is new of a rank's warnings.
-fn say_new_warnings(session: &Session, known: usize, before: &[String]) {
-    if session.is_quiet() || session.warnings().count() == known {
+fn say_new_warnings(session: &mut Session) {
+    let warnings = session.take_new_warnings();
+    if session.is_quiet() {
         return;
     }
-    for warning in session.warnings().filter(|w| !before.iter().any(|b| b == w)) {
+    for warning in warnings {
         say(&match session.ranks() {
             1 => format!("warning: {warning}"),
             _ => format!("rank {}: warning: {warning}", session.rank()),
@@ -156,8 +157,8 @@ unsafe extern "C" fn initialize(params: *const c_void) -> c_int {
             return Err(Failure { status: Status::AlreadyInitialized, reason });
         }
         // SAFETY: Catalyst hands over the node of the simulation.
-        let session = unsafe { with_params(params, |p| Ok(Session::new(p, ranks_of(p)?)?)) }?;
-        say_new_warnings(&session, 0, &[]);
+        let mut session = unsafe { with_params(params, |p| Ok(Session::new(p, ranks_of(p)?)?)) }?;
+        say_new_warnings(&mut session);
         SESSION.with(|s| *s.borrow_mut() = Some(session));
         Ok(())
     })
@@ -166,10 +167,9 @@ unsafe extern "C" fn initialize(params: *const c_void) -> c_int {
 unsafe extern "C" fn execute(params: *const c_void) -> c_int {
     guarded("catalyst_execute", || {
         with_session(|session| {
-            let before: Vec<String> = session.warnings().map(str::to_owned).collect();
             // SAFETY: as above; what is borrowed of the arrays ends with the call.
             let done = unsafe { with_params(params, |p| Ok(session.execute(p)?)) };
-            say_new_warnings(session, before.len(), &before);
+            say_new_warnings(session);
             done
         })
     })

@@ -8,12 +8,14 @@ use std::time::Duration;
 /// Most bytes that a rank tells.
 const LONGEST: usize = 1 << 20;
 
-/// The ranks, and how long they wait for each other.
+/// The ranks, how long they wait for each other, and what each may use.
 pub struct Group<'c> {
     /// The ranks.
     pub comm: &'c mut dyn Communicator,
     /// Longest wait for another rank that gives no sign of life.
     pub timeout: Duration,
+    /// A rank uses all processors that it may, and not one.
+    pub threads: bool,
 }
 
 /// Why there is no picture. Every rank has an error then.

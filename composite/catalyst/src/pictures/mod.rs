@@ -17,7 +17,7 @@ use crate::settings::{Photograph, Picture, Show};
 use agreement::Totals;
 use composite::render::{DataParallel, FrameOptions, RankScene, SecondaryRayPolicy};
 use rt_core::environment::Background;
-use rt_core::frame::Layers;
+use rt_core::frame::{Frame, Layers};
 use rt_core::render::RenderOptions;
 use std::path::Path;
 
@@ -68,19 +68,24 @@ pub fn picture(
     if totals.is_nothing() && group.comm.rank() == 0 {
         warnings.push(format!("{}: nothing is to be seen", file.display()));
     }
-    let frame = rendered(group, scene, &totals, wanted, is_exr)?;
+    let (frame, unusable) = rendered(group, scene, &totals, wanted, is_exr)?;
+    if unusable > 0 {
+        let what = "triangles are left out: a corner is no finite number, or too large";
+        warnings.push(format!("{unusable} {what}"));
+    }
     let written = frame.map_or(Ok(()), |frame| output::write_frame(&frame, file));
     group.agree(&written.map_err(|e| e.to_string()).map(|()| Vec::new()))?;
     Ok(warnings)
 }
 
+/// The picture on rank 0, and the number of this rank's primitives that cannot be hit.
 fn rendered(
     group: &mut Group<'_>,
     mut scene: RankScene,
     totals: &Totals,
     wanted: &Picture,
     with_depth: bool,
-) -> Result<Option<rt_core::frame::Frame>, PictureError> {
+) -> Result<(Option<Frame>, usize), PictureError> {
     let view = camera::View::of(totals, wanted);
     (scene.lights, scene.ambient_occlusion) = view.lights(wanted);
     let [r, g, b] = wanted.background;
@@ -88,8 +93,7 @@ fn rendered(
     let options = FrameOptions {
         timeout: group.timeout,
         secondary_rays: SecondaryRayPolicy::Auto { frames: 1 },
-        // A rank of many is one processor of its machine; a simulation without ranks has all.
-        parallel: group.comm.size() == 1,
+        parallel: group.threads,
         ..FrameOptions::default()
     };
     let mut renderer = DataParallel::distributed(group.comm, scene, options)?;
@@ -103,7 +107,8 @@ fn rendered(
         ..RenderOptions::new(wanted.size[0], wanted.size[1])
     };
     let camera = view.camera().map_err(|e| PictureError::Camera { reason: e.to_string() })?;
-    Ok(renderer.frame(group.comm, &camera, &options)?.frame)
+    let unusable = renderer.part().scene.world.report().skipped;
+    Ok((renderer.frame(group.comm, &camera, &options)?.frame, unusable))
 }
 
 /// Makes a photograph of a gas, which rank 0 writes to `file`. All ranks call it with the same

@@ -73,8 +73,7 @@ pub(super) fn photograph(
         },
         step_voxels: wanted.step_voxels,
     };
-    let options =
-        LightOptions { root: 0, timeout: group.timeout, parallel: group.comm.size() == 1 };
+    let options = LightOptions { root: 0, timeout: group.timeout, parallel: group.threads };
     let made = exposed(group.comm, &gas, brick.as_ref(), &shot, &options)?;
     let mut warnings = Vec::new();
     for (rays, what) in [

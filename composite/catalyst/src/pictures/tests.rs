@@ -88,7 +88,7 @@ fn made(
 ) -> Vec<Result<Vec<String>, String>> {
     let outputs = threads::run(ranks, |mut comm| {
         let own: Vec<&Slab> = slabs.iter().skip(comm.rank()).step_by(ranks).collect();
-        let mut group = Group { comm: &mut comm, timeout: Duration::from_secs(60) };
+        let mut group = Group { comm: &mut comm, timeout: Duration::from_secs(60), threads: false };
         make(&mut group, &params(&own)).map_err(|e| e.to_string())
     });
     outputs.into_iter().map(|o| o.expect("no rank panics")).collect()
@@ -224,5 +224,60 @@ fn a_simulation_without_cells_has_an_empty_picture() {
     let outputs = made(2, &[], |group, params| picture(group, params, &wanted, &file));
     let warnings: Vec<String> = outputs.into_iter().flat_map(|o| o.expect("a picture")).collect();
     assert!(warnings.len() == 1 && warnings[0].contains("nothing is to be seen"), "{warnings:?}");
+    std::fs::remove_file(file).expect("the picture");
+}
+
+#[test]
+fn flat_lattices_are_surfaces_and_are_refused_as_volumes() {
+    let flat = [Slab::new(7..8)];
+    let wanted = settings("[[picture]]\narray = \"density\"\nsize = [24, 24]").picture.remove(0);
+    let drawn = bytes_of("flat", 1, &flat, &wanted);
+    let nothing = Picture { middle: Some([9.0; 3]), radius: Some(0.1), ..wanted.clone() };
+    assert!(drawn != bytes_of("flat-away", 1, &flat, &nothing));
+    let volume = Picture { show: Show::Volume, ..wanted };
+    let file = file("flat-volume");
+    for output in made(2, &flat, |group, params| picture(group, params, &volume, &file)) {
+        let said = output.expect_err("a volume without thickness");
+        assert!(said.contains("it needs 2 on each axis"), "{said}");
+    }
+}
+
+#[test]
+fn ranks_without_cells_take_part() {
+    let text = "
+        [[picture]]
+        array = \"density\"
+        size = [24, 24]
+        [[picture]]
+        show = \"volume\"
+        array = \"density\"
+        size = [24, 24]";
+    for (k, wanted) in settings(text).picture.iter().enumerate() {
+        let one = bytes_of(&format!("some-{k}-1"), 1, &slabs(1, 0), wanted);
+        assert!(one == bytes_of(&format!("some-{k}-3"), 3, &slabs(1, 0), wanted));
+    }
+}
+
+#[test]
+fn triangles_without_a_place_are_counted() {
+    let x = [0.0, 1.0, 0.0, f64::NAN];
+    let y = [0.0, 0.0, 1.0, 1.0];
+    let ids = [0_i64, 1, 2, 1, 2, 3];
+    let mut params = Node::default();
+    params.set("catalyst/channels/a/type", "mesh".into());
+    let at = "catalyst/channels/a/data";
+    params.set(&format!("{at}/coordsets/c/type"), "explicit".into());
+    params.set(&format!("{at}/coordsets/c/values/x"), Node::from(&x[..]));
+    params.set(&format!("{at}/coordsets/c/values/y"), Node::from(&y[..]));
+    params.set(&format!("{at}/topologies/t/type"), "unstructured".into());
+    params.set(&format!("{at}/topologies/t/coordset"), "c".into());
+    params.set(&format!("{at}/topologies/t/elements/shape"), "tri".into());
+    params.set(&format!("{at}/topologies/t/elements/connectivity"), Node::from(&ids[..]));
+    let wanted = settings("[[picture]]\nsize = [8, 8]").picture.remove(0);
+    let file = file("no-place");
+    let mut alone = threads::group(1).remove(0);
+    let mut group = Group { comm: &mut alone, timeout: Duration::from_secs(60), threads: false };
+    let warnings = picture(&mut group, &params, &wanted, &file).expect("a picture");
+    assert!(warnings.iter().any(|w| w.starts_with("1 triangles are left out")), "{warnings:?}");
     std::fs::remove_file(file).expect("the picture");
 }
