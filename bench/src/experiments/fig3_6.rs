@@ -1,5 +1,5 @@
 //! Figure 3.6: weak scaling of data-parallel rendering, with the same number of triangles on every
-//! rank.
+//! rank: of camera rays alone as in the dissertation, and with light from other ranks' parts.
 
 use super::Context;
 use super::many_ranks::{Sharing, cost_columns, frames, powers, with_cost};
@@ -7,50 +7,91 @@ use crate::meshes;
 use crate::plot::{Axis, Plot, Series};
 use crate::record::{Record, Row};
 use composite::render::demo::{Demo, PreparedDemo};
-use composite::render::{FrameOptions, Partition, Split};
+use composite::render::{FrameOptions, Partition, SecondaryRayPolicy, Split};
 use datasets::generate::nested_wavelet::Size;
 use rt_core::mesh::TriMesh;
 use rt_core::render::RenderOptions;
 use std::sync::Arc;
 
+const HEADLIGHT: &str = "headlight";
+const LIT: &str = "shadows and occlusion";
+const LOCAL: &str = "shadows of the own part alone";
+/// Rays of ambient occlusion for each hit.
+const OCCLUSION_RAYS: u32 = 4;
+
 pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
     cost_columns(record);
     record.column("triangles", "", "triangles of the whole scene");
     record.column("per_rank", "", "triangles per rank");
+    record.column("light", "", "what lights the surface");
     let (largest, size, count) =
-        if context.quick { (Size::M1, 384, 1) } else { (Size::M8, 1024, 3) };
+        if context.quick { (Size::M1, 384, 1) } else { (Size::M8, 1024, 5) };
     record.notes.push(format!(
-        "Wavelet surfaces, {size} x {size} pixels, headlight, triangles per rank as constant as \
+        "Wavelet surfaces, {size} x {size} pixels, triangles per rank as constant as \
          the named sizes allow. Every rank traces camera rays \
          where its part is; that the image is that of one node is for composite's tests, and not \
          looked at here. The dissertation plots average and maximum render time: what \
-         lies between them is waiting."
+         lies between them is waiting. `{LIT}`: a lamp with shadows and {OCCLUSION_RAYS} rays of \
+         ambient occlusion for each hit, whose rays go to the ranks whose parts they enter. \
+         `{LOCAL}`: they end where the own part does, so that shadows of other parts are missing."
     ));
     for ranks in powers(1, 128) {
         context.report_step(format!("{ranks} ranks"))?;
         let mesh = mesh(context, largest, ranks)?;
-        let demo = Demo { size_px: [size; 2], global_light: false, ..Demo::default() };
         let triangles = mesh.num_triangles();
-        let (scene, camera) = demo.scene_of(mesh)?;
-        let partition = Partition::new(&scene, ranks, &Split::Triangles);
-        let prepared =
-            PreparedDemo { scene, camera, options: RenderOptions::new(size, size), partition };
-        let measured =
-            frames(&prepared, ranks, count, Sharing::SortLast, &FrameOptions::default())?;
-        record.rows.push(
-            with_cost(Row::new(), ranks, &measured)
-                .with("triangles", triangles)
-                .with("per_rank", triangles / ranks),
-        );
+        for (light, secondary_rays) in [
+            (HEADLIGHT, SecondaryRayPolicy::default()),
+            (LIT, SecondaryRayPolicy::Forward),
+            (LOCAL, SecondaryRayPolicy::LocalOnly),
+        ] {
+            let global_light = light != HEADLIGHT;
+            let demo = Demo { size_px: [size; 2], global_light, ..Demo::default() };
+            let (mut scene, camera) = demo.scene_of(mesh.clone())?;
+            if let Some(occlusion) = &mut scene.ambient_occlusion {
+                occlusion.rays = OCCLUSION_RAYS;
+            }
+            let partition = Partition::new(&scene, ranks, &Split::Triangles);
+            let prepared =
+                PreparedDemo { scene, camera, options: RenderOptions::new(size, size), partition };
+            let options = FrameOptions { secondary_rays, ..FrameOptions::default() };
+            let measured = frames(&prepared, ranks, count, Sharing::SortLast, &options)?;
+            record.rows.push(
+                with_cost(Row::new(), ranks, &measured)
+                    .with("light", light)
+                    .with("triangles", triangles)
+                    .with("per_rank", triangles / ranks),
+            );
+        }
     }
+    let of = |record: &Record, light: &str, column: &str| -> Vec<(f64, f64)> {
+        let rows = record.rows.iter().filter(|r| r.text("light") == Some(light));
+        rows.filter_map(|r| r.number("ranks").zip(r.number(column))).collect()
+    };
     let mut plot = Plot::lines("Weak scaling", Axis::log("ranks", ""), Axis::log("time", "ms"));
-    for (column, name) in
-        [("render_mean", "render, average"), ("render_max", "render, maximum"), ("frame", "frame")]
-    {
-        let points = record.rows.iter().filter_map(|r| r.number("ranks").zip(r.number(column)));
-        plot.series.push(Series::new(name, points.collect()));
+    for (light, column, name) in [
+        (HEADLIGHT, "render_mean", "headlight: render, average"),
+        (HEADLIGHT, "render_max", "headlight: render, maximum"),
+        (HEADLIGHT, "frame", "headlight: frame"),
+        (LIT, "frame", "shadows and occlusion: frame"),
+        (LOCAL, "frame", "shadows of the own part alone: frame"),
+    ] {
+        plot.series.push(Series::new(name, of(record, light, column)));
     }
     record.plots.push(plot);
+    let lit = of(record, LIT, "frame");
+    if let [(_, one), .., (ranks, many)] = lit[..] {
+        record.notes.push(format!(
+            "`{LIT}`: a frame of {ranks} ranks takes {:.2} times that of one rank.",
+            many / one
+        ));
+    }
+    let local = of(record, LOCAL, "frame");
+    let ratio = lit.iter().zip(&local).map(|((_, right), (_, local))| right / local);
+    if let Some(worst) = ratio.max_by(f64::total_cmp) {
+        record.notes.push(format!(
+            "`{LIT}` takes at most {worst:.2} times as long as `{LOCAL}`, over all numbers of ranks."
+        ));
+    }
     Ok(())
 }
 
