@@ -104,6 +104,12 @@ impl<'a> Numbers<'a> {
         self.kind
     }
 
+    /// The numbers as a slice, if they are of this type, without gaps and aligned.
+    pub fn as_slice<T: Scalar>(&self) -> Option<&'a [T]> {
+        let matches = self.kind == T::KIND && self.stride == size_of::<T>();
+        if matches { bytemuck::try_cast_slice(self.bytes).ok() } else { None }
+    }
+
     /// Number `i` as `f64` (64-bit integers beyond 2^53 round). Panics when out of range.
     #[inline]
     #[allow(clippy::unnecessary_cast, reason = "the macro covers f64 too")]
@@ -236,6 +242,10 @@ mod tests {
         let y = Numbers::strided(&bytes[8..], ScalarType::F64, 3, 16).unwrap();
         assert_eq!([0, 1, 2].map(|i| y.get_f64(i)), [10.0, 20.0, 30.0]);
         assert_eq!(y.to_values(), Values::F64(vec![10.0, 20.0, 30.0]));
+        assert!(y.as_slice::<f64>().is_none());
+        let all = Numbers::of(&pairs[..]);
+        assert_eq!(all.as_slice::<f64>(), Some(&pairs[..]));
+        assert!(all.as_slice::<i64>().is_none());
         assert!(Numbers::strided(&bytes[8..], ScalarType::F64, 4, 16).is_none());
         assert!(Numbers::strided(bytes, ScalarType::F64, usize::MAX, 16).is_none());
     }

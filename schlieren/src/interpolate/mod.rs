@@ -85,6 +85,7 @@ pub(crate) trait Interpolate16: Copy + Sync {
 
 /// The cell that holds a coordinate, and the position in that cell in 0..1. Coordinates are clamped
 /// to the lattice; the last cell includes the coordinate n - 1.
+#[inline(always)]
 pub(crate) fn cell(at: f64, nodes: usize) -> (usize, f64) {
     let at = at.clamp(0.0, (nodes - 1) as f64);
     let i = (at as usize).min(nodes - 2);

@@ -236,8 +236,10 @@ impl InBricks {
         steps_of(voxels / self.step_voxels).max(1).saturating_add(2)
     }
 
+    #[inline(always)]
     fn cell_at(&self, at: DVec3) -> [usize; 3] {
-        [0, 1, 2].map(|c| cell(at[c], self.dims[c]).0)
+        let [x, y, z] = self.dims;
+        [cell(at.x, x).0, cell(at.y, y).0, cell(at.z, z).0]
     }
 
     /// Moves a ray as far as `brick` has the nodes.
@@ -313,10 +315,14 @@ impl InBricks {
 
     /// A sample of `brick`: a sum over the 4 x 4 x 4 nodes around the cell with weights of value
     /// and derivative for each axis. Eight nodes of these, or 32, have any weight.
+    #[inline(always)]
     fn sample(&self, at: DVec3, brick: &impl Brick) -> Sample {
         let wide = self.stencil == Stencil::CellAndNeighbours;
-        let axes: [Weights; 3] = [0, 1, 2].map(|c| Weights::new(at[c], self.dims[c], wide));
-        let [x, y, z] = &axes;
+        // Not by `map`, whose call for each sample took a tenth of the march.
+        let [nx, ny, nz] = self.dims;
+        let x = &Weights::new(at.x, nx, wide);
+        let y = &Weights::new(at.y, ny, wide);
+        let z = &Weights::new(at.z, nz, wide);
         let (mut eps, mut gradient) = (0.0, [0.0; 3]);
         for k in 0..4 {
             for j in 0..4 {
@@ -351,6 +357,7 @@ struct Weights {
 }
 
 impl Weights {
+    #[inline(always)]
     fn new(at: f64, nodes: usize, wide: bool) -> Weights {
         let (i, x) = cell(at, nodes);
         // The differences at both nodes of the cell: central ones, of second order at the faces.
@@ -360,11 +367,12 @@ impl Weights {
             (_, false, true) => ([-0.5, 0.0, 0.5, 0.0], [0.5, -2.0, 1.5, 0.0]),
             (_, false, false) => ([-0.5, 0.0, 0.5, 0.0], [0.0, -0.5, 0.0, 0.5]),
         };
+        let slope = |k: usize| (1.0 - x) * below[k] + x * above[k];
         Weights {
             // A node that is not there has no weight; the nearest one is read in its place.
-            nodes: [0, 1, 2, 3].map(|k: usize| (i + k).saturating_sub(1).min(nodes - 1)),
+            nodes: [i.saturating_sub(1), i, i + 1, (i + 2).min(nodes - 1)],
             value: [0.0, 1.0 - x, x, 0.0],
-            slope: [0, 1, 2, 3].map(|k| (1.0 - x) * below[k] + x * above[k]),
+            slope: [slope(0), slope(1), slope(2), slope(3)],
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Uniform points with one array, where the simulation has it.
 
 use super::{BlueprintError, Domain, Field, coordset, fields};
+use crate::node::{Numbers, Scalar};
 use rt_core::glam::DVec3;
 
 /// One array on the points of a uniform lattice, or at the centres of its cells.
@@ -68,6 +69,12 @@ impl<'a> Lattice<'a> {
             return Err(BlueprintError::inconsistent(&at, reason));
         }
         Ok(Some(lattice))
+    }
+
+    /// All values as a slice, x fastest, if they are of this type, of one component, without gaps
+    /// and aligned.
+    pub fn as_slice<T: Scalar>(&self) -> Option<&'a [T]> {
+        self.field.components.get(self.component?).and_then(Numbers::as_slice)
     }
 
     /// The value at `at`. Panics when out of range.

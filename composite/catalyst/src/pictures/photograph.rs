@@ -2,25 +2,43 @@
 
 use super::{Group, PictureError, lattice};
 use crate::blueprint::{Domain, Lattice};
+use crate::node::Scalar;
 use crate::settings::{Between, Photograph, Technique};
 use composite::render::light::{
-    Gas, GasBrick, GasValues, LightOptions, LightTechnique, Shot, photograph as exposed,
+    Gas, GasBrick, GasValues, LightOptions, LightTechnique, Shot, Strided, photograph as exposed,
 };
 use rt_core::glam::{DVec3, UVec3};
 use schlieren::interpolate::Interpolant;
 
+/// Values of any type, with gaps, or the length of a vector.
+struct Any<'l, 'a>(&'l Lattice<'a>);
+
+impl GasValues for Any<'_, '_> {
+    #[inline]
+    fn density(&self, node: UVec3) -> f64 {
+        self.0.value([node.x as usize, node.y as usize, node.z as usize])
+    }
+}
+
 /// Densities in the unit of the simulation.
-struct Densities<'l, 'a> {
-    lattice: &'l Lattice<'a>,
+struct Densities<V> {
+    values: V,
     /// kg/m³ of one unit.
     unit: f64,
 }
 
-impl GasValues for Densities<'_, '_> {
+impl<V: GasValues> GasValues for Densities<V> {
     #[inline]
     fn density(&self, node: UVec3) -> f64 {
-        self.unit * self.lattice.value(node.to_array().map(|n| n as usize))
+        self.unit * self.values.density(node)
     }
+}
+
+/// Values one behind the other.
+fn strided<'a, T: Scalar>(lattice: &Lattice<'a>) -> Option<Strided<'a, T>> {
+    let [i, j, _] = lattice.dims;
+    let dims = UVec3::from(lattice.dims.map(|n| n as u32));
+    Strided::new(lattice.as_slice()?, dims, [1, i, i * j])
 }
 
 /// The picture on rank 0, row by row from the top, and warnings.
@@ -36,15 +54,7 @@ pub(super) fn photograph(
         more => Err(format!("it has {} domains; a photograph takes one of each rank", more.len())),
     };
     group.agree(&one.as_ref().map(|_| Vec::new()).map_err(String::clone))?;
-    let densities = one
-        .ok()
-        .flatten()
-        .map(|(first, lattice)| (*first, Densities { lattice, unit: wanted.density_unit }));
-    let brick = densities.as_ref().map(|(first, values)| GasBrick {
-        first: *first,
-        dims: UVec3::from(values.lattice.dims.map(|n| n as u32)),
-        values,
-    });
+    let one = one.ok().flatten();
     let gas = Gas {
         dims: whole.dims,
         origin_m: wanted.length_unit * whole.origin,
@@ -74,7 +84,26 @@ pub(super) fn photograph(
         step_voxels: wanted.step_voxels,
     };
     let options = LightOptions { root: 0, timeout: group.timeout, parallel: group.threads };
-    let made = exposed(group.comm, &gas, brick.as_ref(), &shot, &options)?;
+    // Types that solvers have are read as such; a type that is found for each value costs a
+    // multiple of the light's march.
+    let made = match one {
+        None => exposed::<Any<'_, '_>>(group.comm, &gas, None, &shot, &options)?,
+        Some((first, lattice)) => {
+            let dims = UVec3::from(lattice.dims.map(|n| n as u32));
+            let unit = wanted.density_unit;
+            let (first, comm) = (*first, &mut *group.comm);
+            if let Some(values) = strided::<f64>(lattice) {
+                let values = &Densities { values, unit };
+                exposed(comm, &gas, Some(&GasBrick { first, dims, values }), &shot, &options)?
+            } else if let Some(values) = strided::<f32>(lattice) {
+                let values = &Densities { values, unit };
+                exposed(comm, &gas, Some(&GasBrick { first, dims, values }), &shot, &options)?
+            } else {
+                let values = &Densities { values: Any(lattice), unit };
+                exposed(comm, &gas, Some(&GasBrick { first, dims, values }), &shot, &options)?
+            }
+        }
+    };
     let mut warnings = Vec::new();
     for (rays, what) in [
         (made.report.masked, "rays ended at a density that is no finite number"),
