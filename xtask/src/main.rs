@@ -211,6 +211,9 @@ fn run_member(member: &str, args: &[&str]) -> Exit {
 }
 
 fn main() -> ExitCode {
+    if let Some(cargo) = std::env::var_os(wheels::one_build::CARGO) {
+        return wheels::one_build::run(&cargo, std::env::args_os().skip(1));
+    }
     let args: Vec<String> = std::env::args().skip(1).collect();
     let exit = match parse(&args) {
         Err(message) => {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use super::packages::{Builder, Package};
-use super::{WheelsOptions, run_it};
+use super::{WheelsOptions, one_build, run_it};
 
 /// Largest wheel of a release build, in bytes.
 const LARGEST: u64 = 6_000_000;
@@ -60,6 +60,10 @@ fn with_maturin(package: &Package, places: &Places<'_>, profile: &str) -> Result
     let place = places.out.display().to_string();
     let mut wheel = Command::new(&maturin);
     wheel.args(["build", "--locked", "--profile", profile, "-m", &manifest, "--out", &place]);
+    if profile == "dev" {
+        let this = std::env::current_exe().map_err(|e| format!("this program: {e}"))?;
+        wheel.env("CARGO", this).env(one_build::CARGO, cargo().get_program());
+    }
     run_it(without_debug_info(wheel.current_dir(places.root)))?;
     let mut sdist = Command::new(&maturin);
     run_it(sdist.current_dir(places.root).args(["sdist", "-m", &manifest, "--out", &place]))

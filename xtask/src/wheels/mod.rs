@@ -16,6 +16,7 @@ use crate::side_by_side;
 use crate::step::{Context, Outcome};
 
 mod make;
+pub(crate) mod one_build;
 mod packages;
 
 use make::{Places, absolute, build_tests, cargo, make};
