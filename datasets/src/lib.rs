@@ -5,6 +5,7 @@
 //! | [`catalogue`] | data sets by name, with sizes and views (start here) |
 //! | [`generate`] | every data set of the thesis as a deterministic function of its size |
 //! | [`isosurface`] | surfaces of uniform fields, with VTK's triangle counts |
+//! | [`contour`] | isosurfaces and plane sections of cells of any shape |
 //! | [`cache`] | disk cache of generated meshes |
 //! | [`image_io`] | images as PNG and multi-layer OpenEXR |
 //! | [`colormaps`], [`view`] | colours and cameras |
@@ -20,6 +21,7 @@ pub mod catalogue;
 #[cfg(feature = "cli")]
 pub mod cli;
 pub mod colormaps;
+pub mod contour;
 mod delaunay;
 pub mod generate;
 pub mod image_io;

@@ -1,6 +1,8 @@
 //! The program `datasets` as started by a user: its output, its files, its exit codes.
 #![cfg(feature = "program")]
 
+use datasets::model::{Attributes, DataArray, Dataset, Points, StructuredGrid, Values};
+use datasets::write::{VtkOptions, write_vtk};
 use datasets::{stored_mesh, stored_volume};
 use glam::{DVec3, UVec3};
 use rt_core::mesh::MeshSlices;
@@ -82,6 +84,46 @@ fn a_flow_keeps_its_fields_and_has_an_isosurface() {
     assert_eq!(out.status.code(), Some(1));
     assert!(text(&out.stderr).contains("cure: "), "{}", text(&out.stderr));
     assert!(!dir.path().join("none.ply").exists());
+}
+
+#[test]
+fn cells_of_any_shape_have_isosurfaces_and_slices() {
+    let dir = tempfile::tempdir().unwrap();
+    let points: Vec<[f64; 3]> = (0..125)
+        .map(|k| [k % 5, k / 5 % 5, k / 25].map(|c| f64::from(c) * 0.25))
+        .map(|[x, y, z]| [x + 0.05 * z, y, z])
+        .collect();
+    let [x, y] = [0, 1].map(|a| points.iter().map(|p| p[a]).collect::<Vec<_>>());
+    let mut grid = StructuredGrid {
+        extent: [0, 4, 0, 4, 0, 4],
+        points: Points::F64(points),
+        attributes: Attributes::default(),
+    };
+    for (name, values) in [("x", x), ("y", y)] {
+        grid.attributes.point.push(DataArray::new(name, 1, Values::F64(values)));
+    }
+    let file = dir.path().join("grid.vts");
+    write_vtk(&file, &Dataset::StructuredGrid(grid), VtkOptions::default()).unwrap();
+
+    let args = ["convert", "grid.vts", "iso.vtp", "--isovalue", "0.3", "--array", "x"];
+    json(dir.path(), &[&args[..], &["--color-by", "y"]].concat());
+    let iso = json(dir.path(), &["info", "iso.vtp"]);
+    let range = &iso["parts"][0]["arrays"][0]["range"];
+    assert_eq!((range[0].as_f64(), range[1].as_f64()), (Some(0.0), Some(1.0)), "{iso}");
+    json(dir.path(), &["convert", "grid.vts", "cut.ply", "--slice", "0,0,0.6,0,0,1"]);
+    let cut = json(dir.path(), &["info", "cut.ply"]);
+    assert!(cut["cells"].as_u64() > Some(60), "{cut}");
+
+    for (words, said) in [
+        (["--isovalue", "7"], "contains the value 7"),
+        (["--slice", "0,0,9,0,0,1"], "meets no cell"),
+        (["--slice", "0,0,9,0,0,0"], "a normal that is not zero"),
+    ] {
+        let words = [&["convert", "grid.vts", "none.ply"][..], &words].concat();
+        let out = datasets(dir.path(), &words);
+        assert!(text(&out.stderr).contains(said), "{}", text(&out.stderr));
+        assert!(matches!(out.status.code(), Some(1 | 2)) && !dir.path().join("none.ply").exists());
+    }
 }
 
 #[test]

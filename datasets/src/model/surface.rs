@@ -515,13 +515,13 @@ impl Builder {
 const MAX_BARE_LATTICE_POINTS: u64 = 1 << 20;
 
 /// The points and cells that `vtkGhostType` hides.
-pub(super) struct GhostFlags<'a> {
+pub(crate) struct GhostFlags<'a> {
     cells: Option<&'a DataArray>,
     points: Option<&'a DataArray>,
 }
 
 impl<'a> GhostFlags<'a> {
-    pub(super) fn new(a: &'a Attributes) -> Self {
+    pub(crate) fn new(a: &'a Attributes) -> Self {
         GhostFlags { cells: a.cell_array("vtkGhostType"), points: a.point_array("vtkGhostType") }
     }
     fn none(&self) -> bool {
@@ -531,11 +531,11 @@ impl<'a> GhostFlags<'a> {
         self.points.is_some()
     }
     /// Whether cell `i` is not drawn: it is hidden, or another process draws it.
-    pub(super) fn cell(&self, i: usize) -> bool {
+    pub(crate) fn cell(&self, i: usize) -> bool {
         self.has(i, HIDDEN_CELL | COPIED_CELL)
     }
     /// Whether cell `i` is hidden and treated as absent.
-    pub(super) fn is_blanked(&self, i: usize) -> bool {
+    pub(crate) fn is_blanked(&self, i: usize) -> bool {
         self.has(i, HIDDEN_CELL)
     }
     fn has(&self, i: usize, bits: u8) -> bool {
