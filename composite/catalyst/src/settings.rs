@@ -48,6 +48,12 @@ pub struct Picture {
     pub colors: String,
     /// The values of isosurfaces.
     pub isovalues: Vec<f64>,
+    /// The array that colours isosurfaces; without it, their values do.
+    pub color_array: Option<String>,
+    /// A point of a slice; without it, the middle of everything.
+    pub slice_point: Option<[f64; 3]>,
+    /// The normal of a slice; without it, y.
+    pub slice_normal: Option<[f64; 3]>,
     /// Opacity of surfaces; of volumes, at the largest value, over a sixteenth of their radius.
     pub opacity: f32,
     /// Pixels per row, and rows.
@@ -78,6 +84,8 @@ pub enum Show {
     Surface,
     /// Where the array has the isovalues.
     Isosurface,
+    /// A plane through the cells.
+    Slice,
     /// The array as a medium, clear at its lowest value.
     Volume,
 }
@@ -162,6 +170,9 @@ impl Default for Picture {
             range: None,
             colors: "cool-warm".into(),
             isovalues: Vec::new(),
+            color_array: None,
+            slice_point: None,
+            slice_normal: None,
             opacity: 1.0,
             size: [1024, 768],
             samples: 4,
@@ -292,6 +303,16 @@ impl Settings {
 }
 
 impl Picture {
+    /// The array whose values give the colours.
+    pub fn coloring_array(&self) -> Option<&str> {
+        self.color_array.as_deref().or(self.array.as_deref())
+    }
+
+    /// Whether there are such values.
+    pub fn is_colored(&self) -> bool {
+        self.coloring_array().is_some()
+    }
+
     fn check(&self) -> Result<(), Fault> {
         check_file(&self.file, self.every, self.size)?;
         check_axes(("from", self.from), ("up", self.up))?;
@@ -329,8 +350,26 @@ impl Picture {
         } else if !self.isovalues.is_empty() {
             return fault("isovalues", isovalues, "they need show = \"isosurface\"");
         }
-        if self.show != Show::Surface && self.array.is_none() {
+        let needs_array = matches!(self.show, Show::Volume | Show::Isosurface);
+        if needs_array && self.array.is_none() {
             return fault("array", "missing".into(), "volumes and isosurfaces need one");
+        }
+        if let Some(name) = self.color_array.as_ref().filter(|_| self.show != Show::Isosurface) {
+            return fault("color_array", name.clone(), "it needs show = \"isosurface\"");
+        }
+        for (key, value) in [("slice_point", self.slice_point), ("slice_normal", self.slice_normal)]
+        {
+            let Some(value) = value else { continue };
+            if self.show != Show::Slice {
+                return fault(key, format!("{value:?}"), "it needs show = \"slice\"");
+            }
+            let usable = match key {
+                "slice_normal" => DVec3::from(value).try_normalize().is_some(),
+                _ => DVec3::from(value).is_finite(),
+            };
+            if !usable {
+                return fault(key, format!("{value:?}"), "give three numbers, not all zero");
+            }
         }
         Ok(())
     }
@@ -441,6 +480,9 @@ mod tests {
             ("[[picture]]\nshow = \"volume\"", "array is missing"),
             ("[[picture]]\nshow = \"isosurface\"\narray = \"p\"", "isovalues is []"),
             ("[[picture]]\nisovalues = [1]", "they need show = \"isosurface\""),
+            ("[[picture]]\ncolor_array = \"p\"", "color_array is p; it needs show"),
+            ("[[picture]]\nslice_normal = [0, 0, 1]", "it needs show = \"slice\""),
+            ("[[picture]]\nshow = \"slice\"\nslice_normal = [0, 0, 0]", "not all zero"),
             ("[[picture]]\nshow = \"points\"", "unknown variant `points`"),
             ("[[photograph]]\nlength_unit = 0", "length_unit is 0"),
             ("[[photograph]]\nopen_fraction = 2", "open_fraction is 2"),

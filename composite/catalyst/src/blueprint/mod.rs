@@ -133,6 +133,16 @@ impl<'n, 'a> Domain<'n, 'a> {
     }
 }
 
+/// Whether a topology of a domain has uniform points.
+///
+/// # Errors
+/// As [`dataset`].
+pub fn is_uniform(domain: &Domain<'_, '_>, topology: Option<&str>) -> Result<bool, BlueprintError> {
+    let Some(topology) = domain.topology(topology)? else { return Ok(false) };
+    let (path, node) = domain.coordset(topology)?;
+    Ok(coordset::kind(&path, node)? == "uniform")
+}
+
 /// A copy of one topology of a domain, with the arrays that lie on it; and warnings. `None` for a
 /// domain without topologies.
 ///

@@ -2,6 +2,7 @@
 
 mod agreement;
 mod camera;
+mod contour;
 mod lattice;
 mod output;
 mod photograph;
@@ -61,7 +62,7 @@ pub fn picture(
     let domains = domains_of(params, wanted.channel.as_deref());
     let (scene, totals) = match wanted.show {
         Show::Surface => surface::outer(group, domains, wanted, &mut warnings)?,
-        Show::Isosurface => surface::isosurfaces(group, domains, wanted, &mut warnings)?,
+        Show::Isosurface | Show::Slice => contour::contour(group, domains, wanted, &mut warnings)?,
         Show::Volume => volume::volume(group, domains, wanted)?,
     };
     let is_exr = file.extension().is_some_and(|e| e == "exr");

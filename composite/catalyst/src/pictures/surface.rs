@@ -1,19 +1,17 @@
-//! Surfaces of this rank's domains: the outer ones of cells, and isosurfaces.
+//! The outer surface of this rank's cells; and the scene of a surface of each rank.
 
 use super::{Group, PictureError, Totals};
-use crate::blueprint::{Domain, Lattice, dataset};
-use crate::settings::Picture;
+use crate::blueprint::{Domain, dataset};
+use crate::settings::{Picture, Show};
 use composite::render::RankScene;
 use datasets::colormaps;
-use datasets::isosurface;
 use datasets::model::{Block, ColorBy, Dataset, Points, extent_dims};
 use rt_core::colormap::ColorMap;
-use rt_core::glam::{DVec3, UVec3};
-use rt_core::grid::Grid;
+use rt_core::glam::DVec3;
 use rt_core::material::{ColorSource, Material};
 use rt_core::mesh::{PerElement, TriMesh};
 
-type Domains<'n, 'a> = Result<Vec<Domain<'n, 'a>>, String>;
+pub(super) type Domains<'n, 'a> = Result<Vec<Domain<'n, 'a>>, String>;
 
 /// The outer surface of all cells.
 pub(super) fn outer(
@@ -22,7 +20,7 @@ pub(super) fn outer(
     wanted: &Picture,
     warnings: &mut Vec<String>,
 ) -> Result<(RankScene, Totals), PictureError> {
-    let copied = domains.and_then(|domains| copied(&domains, wanted, warnings));
+    let copied = domains.and_then(|domains| copied(&domains, wanted.topology.as_deref(), warnings));
     let mine = copied.as_ref().map(|data| {
         let leaves = data.leaves();
         let boxes = leaves.iter().fold(Totals::NOTHING, |all, leaf| all.with_box(bounds(leaf)));
@@ -48,87 +46,15 @@ pub(super) fn outer(
     scene_of(group, mesh, Totals { range: whole.range, ..Totals::NOTHING }, wanted)
 }
 
-/// The isosurfaces of an array on uniform points.
-pub(super) fn isosurfaces(
-    group: &mut Group<'_>,
-    domains: Domains<'_, '_>,
-    wanted: &Picture,
-    warnings: &mut Vec<String>,
-) -> Result<(RankScene, Totals), PictureError> {
-    let name = wanted.array.as_deref().unwrap_or_default();
-    let lattices = domains.and_then(|domains| {
-        let of = |domain| Lattice::of(domain, wanted.topology.as_deref(), name);
-        let all: Result<Vec<_>, _> = domains.iter().map(of).collect();
-        let all = all.map_err(|e| e.to_string())?;
-        Ok(all.into_iter().flatten().collect::<Vec<_>>())
-    });
-    let bounds = lattices.as_ref().map(|lattices| {
-        lattices.iter().fold(Totals::NOTHING, |totals, lattice| {
-            let last = DVec3::from(lattice.dims.map(|n| n.saturating_sub(1) as f64));
-            let corners = [lattice.origin, lattice.origin + lattice.spacing * last];
-            totals.with_box(corners).with_values(lattice.values())
-        })
-    });
-    let whole = group.totals(&bounds.map_err(String::clone))?;
-    let origin = origin_of(&whole);
-    let mesh = lattices.and_then(|lattices| {
-        if lattices.iter().any(|l| l.of_cells) && (lattices.len() > 1 || group.comm.size() > 1) {
-            let text = format!("`{name}` belongs to cells: isosurfaces have gaps between domains");
-            warnings.push(text);
-        }
-        let mut all = TriMesh { origin, ..TriMesh::default() };
-        for lattice in &lattices {
-            let made = isosurface(lattice, &wanted.isovalues, origin, warnings)?;
-            append(&mut all, made)?;
-        }
-        Ok(all)
-    });
-    // The lattice's, so that the view stays as it is while surfaces grow.
-    scene_of(group, mesh, whole, wanted)
-}
-
-fn isosurface(
-    lattice: &Lattice<'_>,
-    isovalues: &[f64],
-    origin: DVec3,
-    warnings: &mut Vec<String>,
-) -> Result<TriMesh, String> {
-    let dims = lattice.dims.map(|n| u32::try_from(n).unwrap_or(u32::MAX));
-    let values = lattice.values().map(|v| v as f32).collect();
-    let grid = Grid::new(UVec3::from(dims), lattice.origin, lattice.spacing, values);
-    let grid = grid.map_err(|e| e.to_string())?;
-    let options = isosurface::Options { normals: false, scalars: true };
-    let made = isosurface::extract_at(&grid, isovalues, options, Some(origin));
-    let made = made.map_err(|e| e.to_string())?;
-    if made.skipped_cells > 0 {
-        let n = made.skipped_cells;
-        warnings.push(format!("{n} cells have no surface: a value there is no finite number"));
-    }
-    Ok(made.mesh)
-}
-
-fn append(whole: &mut TriMesh, piece: TriMesh) -> Result<(), String> {
-    let Ok(first) = u32::try_from(whole.positions.len()) else {
-        return Err("isosurfaces of one rank have more than 2^32 vertices".into());
-    };
-    whole.positions.extend(piece.positions);
-    whole.indices.extend(piece.indices.iter().map(|t| t.map(|k| k.saturating_add(first))));
-    match (&mut whole.scalars, piece.scalars) {
-        (Some(all), Some(more)) => all.values.extend(more.values),
-        (none, more) => *none = more,
-    }
-    Ok(())
-}
-
 /// Copies of all domains.
-fn copied(
+pub(super) fn copied(
     domains: &[Domain<'_, '_>],
-    wanted: &Picture,
+    topology: Option<&str>,
     warnings: &mut Vec<String>,
 ) -> Result<Dataset, String> {
     let mut blocks = Vec::new();
     for domain in domains {
-        let read = dataset(domain, wanted.topology.as_deref()).map_err(|e| e.to_string())?;
+        let read = dataset(domain, topology).map_err(|e| e.to_string())?;
         let Some((data, said)) = read else { continue };
         warnings.extend(said);
         blocks.push(Block { name: domain.path.clone(), data });
@@ -137,7 +63,7 @@ fn copied(
 }
 
 /// Positions of all ranks are relative to this. Far from zero they keep their digits so.
-fn origin_of(totals: &Totals) -> DVec3 {
+pub(super) fn origin_of(totals: &Totals) -> DVec3 {
     let middle = 0.5 * (totals.low + totals.high);
     let size = (totals.high - totals.low).max_element();
     let far = !totals.is_nothing() && middle.abs().max_element() > 4.0 * size;
@@ -145,7 +71,7 @@ fn origin_of(totals: &Totals) -> DVec3 {
 }
 
 /// Bounds of points; those that are no numbers are left out.
-fn bounds(data: &Dataset) -> [DVec3; 2] {
+pub(super) fn bounds(data: &Dataset) -> [DVec3; 2] {
     let nothing = [DVec3::INFINITY, DVec3::NEG_INFINITY];
     let grow = |[low, high]: [DVec3; 2], p: DVec3| match p.is_finite() {
         true => [low.min(p), high.max(p)],
@@ -175,7 +101,7 @@ fn bounds(data: &Dataset) -> [DVec3; 2] {
 }
 
 /// All values of the array.
-fn values(data: &Dataset, name: Option<&str>) -> Vec<f64> {
+pub(super) fn values(data: &Dataset, name: Option<&str>) -> Vec<f64> {
     let Some(Ok(by)) = name.map(|name| ColorBy::find(data, name)) else { return Vec::new() };
     let mut all = Vec::new();
     for leaf in data.leaves() {
@@ -187,7 +113,7 @@ fn values(data: &Dataset, name: Option<&str>) -> Vec<f64> {
 }
 
 /// The scene of a mesh of each rank, with what is known of the whole besides the meshes.
-fn scene_of(
+pub(super) fn scene_of(
     group: &mut Group<'_>,
     mesh: Result<TriMesh, String>,
     known: Totals,
@@ -200,8 +126,13 @@ fn scene_of(
         let reason = format!("`{name}` belongs to points on some ranks, to cells on others");
         return Err(PictureError::Contradiction { reason });
     }
-    let mut material = Material::matte([0.8; 3]).with_opacity(wanted.opacity);
-    if wanted.array.is_some() {
+    let mut material = match wanted.show {
+        // Colours of a slice are read, and not seen in a light.
+        Show::Slice => Material::unlit([0.8; 3]),
+        _ => Material::matte([0.8; 3]),
+    }
+    .with_opacity(wanted.opacity);
+    if wanted.is_colored() {
         material.color_source = ColorSource::Scalars(colors(&totals, wanted).into());
     }
     let mut scene = RankScene::new();

@@ -281,3 +281,111 @@ fn triangles_without_a_place_are_counted() {
     assert!(warnings.iter().any(|w| w.starts_with("1 triangles are left out")), "{warnings:?}");
     std::fs::remove_file(file).expect("the picture");
 }
+
+/// Hexahedra between some planes of the lattice.
+struct Hexahedra {
+    places: [Vec<f64>; 3],
+    ids: Vec<i64>,
+    values: Vec<f64>,
+    cell_values: Vec<f64>,
+    ghosts: Vec<u8>,
+}
+
+impl Hexahedra {
+    /// Cells between the planes, of which those outside `own` are copies.
+    fn new(planes: std::ops::Range<usize>, own: std::ops::Range<usize>) -> Hexahedra {
+        let h = 1.0 / (N - 1) as f64;
+        let point = |k: usize| [k % N, k / N % N, planes.start + k / (N * N)];
+        let count = N * N * planes.len();
+        let places = [0, 1, 2].map(|a| (0..count).map(|k| point(k)[a] as f64 * h).collect());
+        let mut all = Hexahedra {
+            places,
+            ids: Vec::new(),
+            values: (0..count).map(|k| value(point(k))).collect(),
+            cell_values: Vec::new(),
+            ghosts: Vec::new(),
+        };
+        for k in 0..(N - 1) * (N - 1) * (planes.len() - 1) {
+            let [x, y, z] = [k % (N - 1), k / (N - 1) % (N - 1), k / (N - 1) / (N - 1)];
+            let first = (x + N * (y + N * z)) as i64;
+            let (n, up) = (N as i64, (N * N) as i64);
+            let eight = [0, 1, 1 + n, n, up, 1 + up, 1 + n + up, n + up];
+            all.ids.extend(eight.map(|step| first + step));
+            all.cell_values.push(value([x, y, planes.start + z]));
+            all.ghosts.push(u8::from(!own.contains(&(planes.start + z))));
+        }
+        all
+    }
+
+    fn params(&self) -> Node<'_> {
+        let mut mesh = Node::default();
+        mesh.set("coordsets/c/type", "explicit".into());
+        for (name, values) in ["x", "y", "z"].iter().zip(&self.places) {
+            mesh.set(&format!("coordsets/c/values/{name}"), Node::from(&values[..]));
+        }
+        mesh.set("topologies/t/type", "unstructured".into());
+        mesh.set("topologies/t/coordset", "c".into());
+        mesh.set("topologies/t/elements/shape", "hex".into());
+        mesh.set("topologies/t/elements/connectivity", Node::from(&self.ids[..]));
+        for (name, of, values) in [
+            ("density", "vertex", Node::from(&self.values[..])),
+            ("of_cells", "element", Node::from(&self.cell_values[..])),
+            ("vtkGhostType", "element", Node::from(&self.ghosts[..])),
+        ] {
+            mesh.set(&format!("fields/{name}/association"), of.into());
+            mesh.set(&format!("fields/{name}/topology"), "t".into());
+            mesh.set(&format!("fields/{name}/values"), values);
+        }
+        let mut params = Node::default();
+        params.set("catalyst/channels/cells/type", "mesh".into());
+        params.set("catalyst/channels/cells/data", mesh);
+        params
+    }
+}
+
+#[test]
+fn isosurfaces_and_slices_of_cells_have_the_bytes_of_one_process() {
+    let text = "
+        [[picture]]
+        show = \"isosurface\"
+        array = \"density\"
+        isovalues = [0.8, 1.0]
+        size = [40, 30]
+        [[picture]]
+        show = \"isosurface\"
+        array = \"of_cells\"
+        isovalues = [0.9]
+        color_array = \"density\"
+        size = [40, 30]
+        [[picture]]
+        show = \"slice\"
+        array = \"density\"
+        slice_point = [0.5, 0.4, 0.5]
+        slice_normal = [0.3, 1, 0.2]
+        size = [40, 30]";
+    for (k, wanted) in settings(text).picture.iter().enumerate() {
+        let drawn = |ranks: usize| {
+            let file = file(&format!("cells-{k}-{ranks}"));
+            let outputs = threads::run(ranks, |mut comm| {
+                let end = |r: usize| (N - 1) * r / ranks;
+                let own = end(comm.rank())..end(comm.rank() + 1);
+                // With a layer of the neighbours' cells, for means of cells.
+                let planes = own.start.saturating_sub(1)..(own.end + 2).min(N);
+                let cells = Hexahedra::new(planes, own);
+                let mut group =
+                    Group { comm: &mut comm, timeout: Duration::from_secs(60), threads: false };
+                picture(&mut group, &cells.params(), wanted, &file).map_err(|e| e.to_string())
+            });
+            for output in outputs {
+                output.expect("no rank panics").expect("a picture");
+            }
+            let bytes = std::fs::read(&file).expect("the picture");
+            std::fs::remove_file(&file).expect("the picture");
+            bytes
+        };
+        let one = drawn(1);
+        for ranks in [2, 4] {
+            assert!(one == drawn(ranks), "picture {k} on {ranks} ranks");
+        }
+    }
+}
