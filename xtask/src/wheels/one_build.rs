@@ -1,10 +1,10 @@
 //! What maturin calls as cargo in CI: it builds the whole workspace, and shows maturin one package.
 //!
 //! maturin calls `cargo rustc` for one package. The packages that it needs then have other features
-//! than in the step `build-tests`, where all members and their tests ask for some; so cargo compiled
-//! rt-core twice more, and datasets and schlieren once. Of the whole workspace with its tests,
-//! only what Python's interface needs is left to compile. `cargo xtask wheels`, which makes what is
-//! published, calls cargo itself.
+//! than in the step `build-tests`, where all members and their tests ask for some; so cargo
+//! compiled rt-core twice more, and datasets and schlieren once. Of the whole workspace with its
+//! tests, only what Python's interface needs is left to compile. `cargo xtask wheels`, which makes
+//! what is published, calls cargo itself.
 
 use std::ffi::{OsStr, OsString};
 use std::io::Write as _;
