@@ -28,6 +28,7 @@ mod fig5_13;
 mod fig5_14;
 mod frames;
 mod image_error;
+mod in_situ;
 mod installed_tracers;
 mod many_meshes;
 mod many_ranks;
@@ -131,6 +132,12 @@ pub const ALL: &[Experiment] = &[
         chapter: 3,
         title: "Error against bytes and time of blending 128 faint layers, by pixel format",
         run: accuracy_composite::run,
+    },
+    Experiment {
+        id: "in-situ",
+        chapter: 3,
+        title: "What pictures cost a simulation that makes them while it runs",
+        run: in_situ::run,
     },
     Experiment {
         id: "table4.1",
