@@ -2,7 +2,9 @@
 //! summary.
 
 use datasets::image_io::{read_exr, read_png};
-use datasets::model::{DataArray, Dataset, ImageData, PolyData, Values};
+use datasets::model::{
+    Attributes, DataArray, Dataset, ImageData, Points, PolyData, StructuredGrid, Values,
+};
 use datasets::write::{VtkOptions, write_glb, write_obj, write_ply, write_vtk};
 use glam::DVec3;
 use rt_core::mesh::{Attribute, TriMesh};
@@ -181,6 +183,39 @@ fn image_data_becomes_a_volume_that_opacity_and_isovalue_change() {
         object["warnings"][0].as_str().unwrap().contains("shadows changes no pixel"),
         "{object}"
     );
+}
+
+#[test]
+fn an_isovalue_is_not_ignored_for_cells_that_are_no_lattice() {
+    let dir = tempfile::tempdir().unwrap();
+    let [vts, png] = ["grid.vts", "iso.png"].map(|name| dir.path().join(name));
+    let at = |k: usize| [k % 9, k / 9 % 9, k / 81].map(|c| c as f64 / 8.0 - 0.5);
+    let points: Vec<[f64; 3]> = (0..729).map(at).map(|[x, y, z]| [x + 0.1 * y, y, z]).collect();
+    let radius = points.iter().map(|p| DVec3::from(*p).length()).collect();
+    let height = points.iter().map(|p| p[2]).collect();
+    let mut grid = StructuredGrid {
+        extent: [0, 8, 0, 8, 0, 8],
+        points: Points::F64(points),
+        attributes: Attributes::default(),
+    };
+    grid.attributes.point.push(DataArray::new("radius", 1, Values::F64(radius)));
+    grid.attributes.point.push(DataArray::new("height", 1, Values::F64(height)));
+    write_vtk(&vts, &Dataset::StructuredGrid(grid), VtkOptions::default()).unwrap();
+    let [vts, png] = [&vts, &png].map(|path| path.to_str().unwrap());
+    let render = ["render", vts, "-o", png, "--size", "40x40", "--json"];
+    let drawn = |more: &[&str]| {
+        let out = bench(&[&render[..], more].concat());
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        let said: Value = serde_json::from_slice(&out.stdout).unwrap();
+        (read_png(Path::new(png)).unwrap().rgba().unwrap(), said)
+    };
+    let (box_of_cells, _) = drawn(&[]);
+    let (ball, said) = drawn(&["--isovalue", "0.4"]);
+    assert!(said["contents"][0].as_str().unwrap().contains("`radius` = 0.4 in 512"), "{said}");
+    assert_ne!(ball, box_of_cells);
+    let (colored, _) = drawn(&["--isovalue", "0.4", "--color-by", "height"]);
+    assert_ne!(ball, colored);
+    refused(&[&render[..], &["--isovalue", "7"]].concat(), ["`radius` ranges from 0", "choose"]);
 }
 
 #[test]

@@ -204,7 +204,8 @@ struct RenderArgs {
     /// Scalars at the ends of the colour map [default: range of the data]
     #[arg(long, value_name = "LOW,HIGH", value_parser = render::range, allow_hyphen_values = true)]
     range: Option<[f32; 2]>,
-    /// Isovalue for image data [default: the middle of the range; with a volume, no isosurface]
+    /// Isovalue [default: of image data, the middle of the range; with a volume and for cells of
+    /// other kinds, no isosurface]
     #[arg(long, value_name = "VALUE", allow_hyphen_values = true)]
     isovalue: Option<f32>,
     /// Renders this array as a volume; `--effects volumes` alone takes the array marked in the file

@@ -5,6 +5,7 @@
 //! [`framing`] finds a camera, [`draw`] renders the image and records what it did, and [`save`]
 //! writes PNG and OpenEXR. [`gallery`] contains the images of the report.
 
+mod cell_contour;
 pub mod framing;
 pub mod gallery;
 mod materials;

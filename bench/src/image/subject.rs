@@ -1,5 +1,6 @@
 //! The subject of an image: geometry with its own colours, from a file or from the catalogue.
 
+use super::cell_contour::contour_of_cells;
 use super::framing::corners_of_box;
 use super::materials::SceneMaterials;
 use anyhow::Context as _;
@@ -218,6 +219,9 @@ impl Subject {
             Content::Scene(_) if load_options.volume != VolumeChoice::No => {
                 anyhow::bail!("{} files hold meshes; a volume needs a uniform grid", opened.format)
             }
+            Content::Scene(_) if load_options.isovalue.is_some() => {
+                anyhow::bail!("{} files hold meshes; --isovalue needs cells", opened.format)
+            }
             Content::Scene(model) => from_scene(model, load_options)?,
             Content::Data(data) => from_data(data, load_options)?,
         };
@@ -338,6 +342,15 @@ fn from_data(data: &Dataset, load_options: &LoadOptions) -> anyhow::Result<Subje
     }
     if let Some(grid) = lattice(data, &color, &mut subject)? {
         return isosurface(subject, data, grid, load_options);
+    }
+    if let Some(isovalue) = load_options.isovalue {
+        let array = marked_or_first_array(data).context("--isovalue: the file has no array")?;
+        let LoadOptions { color_by, origin, .. } = load_options;
+        let found = contour_of_cells(data, &array, isovalue, color_by.as_deref(), *origin)?;
+        subject.warnings.extend(found.warnings);
+        subject.contents.push(found.content);
+        subject.add_mesh(found.mesh, DEFAULT_COLOR);
+        return Ok(subject);
     }
     let (mesh, report) = data.to_trimesh_at(color.as_deref(), load_options.origin)?;
     subject.warnings.extend(report.warnings());
