@@ -324,6 +324,9 @@ impl Picture {
         if let Some([a, b]) = self.range.filter(|[a, b]| !(a < b && (b - a).is_finite())) {
             return fault("range", format!("[{a}, {b}]"), "the first is less than the second");
         }
+        if let Some(range) = self.range.filter(|_| !self.is_colored()) {
+            return fault("range", format!("{range:?}"), "it needs an array");
+        }
         if !(1..=MOST_SAMPLES).contains(&self.samples) {
             return fault("samples", self.samples.to_string(), "give 1 to 1024");
         }
@@ -400,6 +403,14 @@ impl Photograph {
                 return Err((key, value.to_string(), "give a number".into()));
             }
         }
+        let (key, value, of) = match self.technique {
+            Technique::Schlieren => ("focus", self.focus, "shadowgraph"),
+            Technique::Shadowgraph => ("knife_deg", self.knife_deg, "schlieren"),
+        };
+        if value != 0.0 {
+            let rule = format!("it needs technique = \"{of}\"");
+            return Err((key, value.to_string(), rule));
+        }
         if !(0.0..=1.0).contains(&self.open_fraction) {
             return Err(("open_fraction", self.open_fraction.to_string(), "give 0 to 1".into()));
         }
@@ -474,6 +485,8 @@ mod tests {
             ("[[picture]]\nfrom = [0, 0, 2]", "up is [0, 0, 1]; it may not be parallel to from"),
             ("[[picture]]\ncolors = \"jet\"", "colors is jet; give one of viridis"),
             ("[[picture]]\nrange = [1, 1]", "range is [1, 1]"),
+            ("[[picture]]\nrange = [0, 1]", "range is [0.0, 1.0]; it needs an array"),
+            ("[[photograph]]\nfocus = 0.1", "focus is 0.1; it needs technique"),
             ("[[picture]]\nzoom = nan", "zoom is NaN"),
             ("[[picture]]\nradius = -1", "radius is -1"),
             ("[[picture]]\nmiddle = [0, inf, 0]", "middle is [0.0, inf, 0.0]"),

@@ -73,6 +73,11 @@ fn field<'a>(name: &str, node: &Node<'a>) -> Result<Field<'a>, String> {
 }
 
 impl<'a> Field<'a> {
+    /// Whether it marks cells or points that are not to be drawn.
+    pub fn marks_ghosts(&self) -> bool {
+        [GHOSTS, GHOSTS_OF_ASCENT].contains(&self.name.as_str())
+    }
+
     /// The field and the component that `wanted` names: `pressure`, `velocity` (the length of the
     /// vector), `velocity:x` or `velocity:0`, as [`ColorBy`](datasets::model::ColorBy) has it.
     pub fn find<'f>(

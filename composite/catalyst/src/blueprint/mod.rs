@@ -133,14 +133,19 @@ impl<'n, 'a> Domain<'n, 'a> {
     }
 }
 
-/// Whether a topology of a domain has uniform points.
+/// Whether a topology of a domain has uniform points, and draws all its cells.
 ///
 /// # Errors
 /// As [`dataset`].
-pub fn is_uniform(domain: &Domain<'_, '_>, topology: Option<&str>) -> Result<bool, BlueprintError> {
+pub fn is_whole_lattice(
+    domain: &Domain<'_, '_>,
+    topology: Option<&str>,
+) -> Result<bool, BlueprintError> {
     let Some(topology) = domain.topology(topology)? else { return Ok(false) };
     let (path, node) = domain.coordset(topology)?;
-    Ok(coordset::kind(&path, node)? == "uniform")
+    let fields = fields(domain, topology.0, &mut Vec::new());
+    let has_ghosts = fields.iter().any(Field::marks_ghosts);
+    Ok(coordset::kind(&path, node)? == "uniform" && !has_ghosts)
 }
 
 /// A copy of one topology of a domain, with the arrays that lie on it; and warnings. `None` for a

@@ -2,7 +2,7 @@
 
 use super::surface::{Domains, bounds, copied, origin_of, scene_of, values};
 use super::{Group, PictureError, Totals};
-use crate::blueprint::{Domain, Lattice, is_uniform};
+use crate::blueprint::{Domain, Lattice, is_whole_lattice};
 use crate::settings::{Picture, Show};
 use composite::render::RankScene;
 use datasets::contour::{ContourOf, contour as contour_of_cells};
@@ -54,7 +54,7 @@ fn fields_of<'a>(
     let (mut lattices, mut others) = (Vec::new(), Vec::new());
     for domain in domains {
         let is_plain = wanted.show == Show::Isosurface && wanted.color_array.is_none();
-        if is_plain && is_uniform(domain, topology).map_err(|e| e.to_string())? {
+        if is_plain && is_whole_lattice(domain, topology).map_err(|e| e.to_string())? {
             let name = wanted.array.as_deref().unwrap_or_default();
             let lattice = Lattice::of(domain, topology, name).map_err(|e| e.to_string())?;
             if let Some(lattice) = lattice.filter(|l| !l.of_cells) {

@@ -389,3 +389,31 @@ fn isosurfaces_and_slices_of_cells_have_the_bytes_of_one_process() {
         }
     }
 }
+
+#[test]
+fn hidden_cells_of_a_lattice_have_no_isosurface() {
+    let slab = Slab::new(0..N);
+    let ghosts = vec![32_u8; (N - 1).pow(3)];
+    let text = "[[picture]]\nshow = \"isosurface\"\narray = \"density\"\nisovalues = [0.9]";
+    let wanted = Picture { size: [16, 16], ..settings(text).picture.remove(0) };
+    let drawn = |hidden: bool| {
+        let one = [&slab];
+        let mut params = params(&one);
+        if hidden {
+            let at = "catalyst/channels/gas/data/0/fields/vtkGhostType";
+            params.set(&format!("{at}/association"), "element".into());
+            params.set(&format!("{at}/values"), Node::from(&ghosts[..]));
+        }
+        let file = file(&format!("hidden-{hidden}"));
+        let mut alone = threads::group(1).remove(0);
+        let mut group =
+            Group { comm: &mut alone, timeout: Duration::from_secs(60), threads: false };
+        picture(&mut group, &params, &wanted, &file).expect("a picture");
+        let bytes = std::fs::read(&file).expect("the picture");
+        std::fs::remove_file(file).expect("the picture");
+        bytes
+    };
+    let [seen, hidden] = [false, true].map(drawn);
+    let nothing = Picture { isovalues: vec![99.0], ..wanted.clone() };
+    assert!(seen != hidden && hidden == bytes_of("hidden-none", 1, &slabs(1, 0), &nothing));
+}
