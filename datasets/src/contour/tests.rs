@@ -183,7 +183,9 @@ fn pieces_that_share_their_points_meet() {
         let found = contour(&blocks(kind), &of_values(&[0.31]), None, None).unwrap();
         assert_eq!(open_edges(&found.mesh), 0, "{kind}");
     }
-    assert!(area(&both) > 1.1);
+    let ball = 4.0 * std::f64::consts::PI * 0.31 * 0.31;
+    let ratio = area(&both) / ball;
+    assert!((0.95..1.0).contains(&ratio), "{ratio}");
 }
 
 #[test]
