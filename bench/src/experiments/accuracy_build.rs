@@ -11,7 +11,8 @@ use crate::plot::{Axis, Plot, Point, Series};
 use crate::rays::View;
 use crate::record::{Record, Row};
 use crate::rt_core_tracer::{Mode, RtCoreTracer};
-use crate::runner::{Ratio, Schedule, order};
+use crate::runner::{Ratio, Schedule, VERDICT_ROUNDS, order};
+use crate::stats::Summary;
 use datasets::generate::nested_wavelet::Size;
 use rt_core::bvh::{BuildOptions, BuildQuality};
 use rt_core::mesh::TriMesh;
@@ -20,7 +21,9 @@ use std::sync::Arc;
 pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
     compare::explain_columns(record);
     record.column("preset", "", "quality of the build");
-    record.column("build", "s", "fastest of two builds, wall time, all threads");
+    record.column("build", "s", "median of the builds in turns, wall time, all threads");
+    record.column("build_low", "s", "fastest of these builds; empty where one was timed");
+    record.column("build_high", "s", "slowest of these builds; empty where one was timed");
     record.column("bytes_per_triangle", "B", "memory of the structure, without the input mesh");
     record.notes.push(
         "Every preset gives the same image; only the time differs. A ratio is the time of the \
@@ -55,27 +58,7 @@ fn scene(
     mesh: &Arc<TriMesh>,
     pixels: u32,
 ) -> anyhow::Result<()> {
-    let mut built: Vec<(BuildQuality, RtCoreTracer)> = vec![];
-    let mut fastest_secs = vec![f64::INFINITY; BuildQuality::ALL.len()];
-    for round in 0..2 {
-        for i in order(fastest_secs.len(), round) {
-            let quality = BuildQuality::ALL[i];
-            context.report_step(format!(
-                "{name}: building, {}, round {}",
-                quality.name(),
-                round + 1
-            ))?;
-            let ours = RtCoreTracer::build(mesh, &BuildOptions { quality, ..Default::default() })?;
-            fastest_secs[i] = fastest_secs[i].min(ours.cost.wall_secs);
-            if round == 1 {
-                built.push((quality, ours));
-            }
-        }
-    }
-    built.sort_by_key(|(quality, _)| BuildQuality::ALL.iter().position(|q| q == quality));
-    for ((_, ours), secs) in built.iter_mut().zip(fastest_secs) {
-        ours.cost.wall_secs = secs;
-    }
+    let (built, build_secs) = build_in_turns(context, name, mesh)?;
     let mut baselines: Vec<(String, EmbreeScene)> = vec![];
     for (quality, robust) in
         [Quality::Medium, Quality::High].into_iter().flat_map(|q| [(q, true), (q, false)])
@@ -117,15 +100,26 @@ fn scene(
             .with("triangles", mesh.num_triangles())
             .with("view", view.name);
         let rows = compare::rows(&base.with("simd", "best"), kind, &rays, &contenders, &timings);
-        let ours = built.iter().map(|(quality, o)| ("rt-core watertight", quality.name(), o.cost));
-        let theirs =
-            baselines.iter().map(|(baseline, s)| (baseline.as_str(), baseline.as_str(), s.cost));
-        for (row, (tracer, preset, cost)) in rows.into_iter().zip(ours.chain(theirs)) {
-            let bytes = cost.bytes as f64 / mesh.num_triangles() as f64;
-            let row = row.with("tracer", tracer).with("preset", preset);
-            record.rows.push(row.with("build", cost.wall_secs).with("bytes_per_triangle", bytes));
-        }
         let (mine, others) = contenders.split_at(built.len());
+        for (i, mut row) in rows.into_iter().enumerate() {
+            let (tracer, preset, cost) = match built.get(i) {
+                Some((quality, ours)) => ("rt-core watertight", quality.name(), ours.cost),
+                None => {
+                    let (baseline, scene) = &baselines[i - built.len()];
+                    (baseline.as_str(), baseline.as_str(), scene.cost)
+                }
+            };
+            let bytes = cost.bytes as f64 / mesh.num_triangles() as f64;
+            row = row.with("tracer", tracer).with("preset", preset);
+            row = row.with("bytes_per_triangle", bytes);
+            record.rows.push(match build_secs.get(i) {
+                Some(secs) => row
+                    .with("build", secs.median)
+                    .with("build_low", secs.low)
+                    .with("build_high", secs.high),
+                None => row.with("build", cost.wall_secs),
+            });
+        }
         for other in others {
             let best = mine.last().expect("there are presets");
             if let Some(r) = timings.ratio(&best.name(), &other.name()) {
@@ -145,6 +139,36 @@ fn scene(
         }
     }
     Ok(())
+}
+
+/// Builds the mesh with every preset, one after the other in each round. Gives the last build of
+/// each preset and its wall times in seconds. The first round only warms the machine up: pages of
+/// the mesh and of the heap are touched for the first time there.
+fn build_in_turns(
+    context: &mut Context<'_>,
+    name: &str,
+    mesh: &Arc<TriMesh>,
+) -> anyhow::Result<(Vec<(BuildQuality, RtCoreTracer)>, Vec<Summary>)> {
+    let qualities = BuildQuality::ALL;
+    let rounds = if context.quick { 1 } else { VERDICT_ROUNDS };
+    let mut secs = vec![vec![]; qualities.len()];
+    let mut built: Vec<Option<RtCoreTracer>> = qualities.iter().map(|_| None).collect();
+    for round in 0..=rounds {
+        for i in order(qualities.len(), round) {
+            let quality = qualities[i];
+            let step = format!("{name}: building, {}, round {round} of {rounds}", quality.name());
+            context.report_step(step)?;
+            // The build before is dropped first, so that each has the same memory at hand.
+            built[i] = None;
+            let ours = RtCoreTracer::build(mesh, &BuildOptions { quality, ..Default::default() })?;
+            if round > 0 {
+                secs[i].push(ours.cost.wall_secs);
+            }
+            built[i] = Some(ours);
+        }
+    }
+    let built = qualities.into_iter().zip(built.into_iter().flatten()).collect();
+    Ok((built, secs.iter().filter_map(|s| Summary::of(s)).collect()))
 }
 
 /// Time to the n-th frame, including the build: at the intersections, the better build has paid
@@ -177,8 +201,9 @@ mod tests {
     use super::*;
     use std::path::PathBuf;
 
-    /// From the newest record: mesh, preset, build time and time of all rays, in seconds.
-    fn recorded() -> Vec<(String, String, f64, f64)> {
+    /// From the newest record: mesh, preset, build time, and the times of primary rays and of all
+    /// rays, in seconds.
+    fn recorded() -> Vec<(String, String, f64, [f64; 2])> {
         let runs = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("runs");
         let folders = std::fs::read_dir(runs).expect("bench/runs").flatten();
         let mut files: Vec<PathBuf> =
@@ -188,24 +213,29 @@ mod tests {
         let mut lines = text.lines().filter(|l| !l.starts_with('#'));
         let names: Vec<&str> = lines.next().expect("names").split(',').collect();
         let place = |name: &str| names.iter().position(|n| n.starts_with(name)).expect("a column");
-        let [mesh, tracer, time, preset, build] =
-            ["mesh", "tracer", "time [ms]", "preset", "build [s]"].map(place);
-        let mut out: Vec<(String, String, f64, f64)> = vec![];
+        let [mesh, rays, tracer, time, preset, build] =
+            ["mesh", "rays", "tracer", "time [ms]", "preset", "build [s]"].map(place);
+        let mut out: Vec<(String, String, f64, [f64; 2])> = vec![];
         // Names of baselines contain commas and quotes; ours do not.
         for row in lines.filter(|l| !l.contains('"')).map(|l| l.split(',').collect::<Vec<_>>()) {
             assert!(row[tracer].starts_with("rt-core"), "{row:?}");
             let number = |i: usize| row[i].parse::<f64>().expect("a number");
             let secs = number(time) / 1e3;
+            let primary = if row[rays] == "primary" { secs } else { 0.0 };
             match out.iter_mut().find(|(m, p, ..)| m == row[mesh] && p == row[preset]) {
-                Some(known) => known.3 += secs,
-                None => out.push((row[mesh].into(), row[preset].into(), number(build), secs)),
+                Some((.., known)) => *known = [known[0] + primary, known[1] + secs],
+                None => {
+                    let frame = [primary, secs];
+                    out.push((row[mesh].into(), row[preset].into(), number(build), frame));
+                }
             }
         }
         out
     }
 
-    /// Reads the record and times nothing: for some mesh and some number of frames, building with
-    /// the preset and tracing that many frames takes the least time.
+    /// Reads the record and times nothing: for some mesh and some number of frames, of primary rays
+    /// or with ambient occlusion, building with the preset and tracing that many frames takes the
+    /// least time.
     #[test]
     fn every_preset_is_the_best_choice_somewhere_in_the_record() {
         let rows = recorded();
@@ -213,8 +243,10 @@ mod tests {
         let meshes: std::collections::BTreeSet<&str> = rows.iter().map(|r| r.0.as_str()).collect();
         let known: Vec<_> = BuildQuality::ALL.iter().map(|q| q.name()).collect();
         for mesh in meshes {
-            for frames in (0..16).map(|k| f64::from(1 << k)) {
-                let total = |r: &&(String, String, f64, f64)| r.2 + frames * r.3;
+            for (frames, rays) in
+                (0..16).flat_map(|k| [(f64::from(1 << k), 0), (f64::from(1 << k), 1)])
+            {
+                let total = |r: &&(String, String, f64, [f64; 2])| r.2 + frames * r.3[rays];
                 let best = rows.iter().filter(|r| r.0 == mesh && known.contains(&r.1.as_str()));
                 let best = best.min_by(|a, b| total(a).total_cmp(&total(b))).expect("presets");
                 winners.insert(best.1.as_str());
