@@ -135,6 +135,21 @@ fn photographs_by_1_to_16_ranks_have_the_bits_of_one_process() {
 }
 
 #[test]
+fn bricks_along_the_light_work_while_the_first_still_has_rays() {
+    let shot = Shot { width: 120, height: 100, ..shot(KNIFE, DVec3::Z) };
+    let corners = (shot.width + 1) * (shot.height + 1);
+    let one = picture(by_ranks(UVec3::ONE, 0, &shot));
+    let ends = by_ranks(UVec3::new(1, 1, 4), 1, &shot);
+    let moved = ends.iter().map(|end| end.as_ref().expect("a photograph").report.rays_moved);
+    assert!(moved.min() > Some(u64::from(corners) / 2), "nearly all rays cross all bricks");
+    let many = picture(ends);
+    // One round for all rays would be one for each brick, and one rank at work in each.
+    let rounds = many.report.rounds;
+    assert!(rounds > 15 && rounds < 15 + corners / 512, "{rounds} rounds for {corners} rays");
+    assert!(many.picture == one.picture && many.exits == one.exits);
+}
+
+#[test]
 fn rays_cross_borders_and_are_bent_on_both_sides() {
     let shot = shot(KNIFE, OBLIQUE);
     let ends = by_ranks(UVec3::new(2, 2, 2), 1, &shot);

@@ -141,6 +141,9 @@ fn scene(
     Ok(())
 }
 
+/// A preset and what it built.
+type Built = (BuildQuality, RtCoreTracer);
+
 /// Builds the mesh with every preset, one after the other in each round. Gives the last build of
 /// each preset and its wall times in seconds. The first round only warms the machine up: pages of
 /// the mesh and of the heap are touched for the first time there.
@@ -148,7 +151,7 @@ fn build_in_turns(
     context: &mut Context<'_>,
     name: &str,
     mesh: &Arc<TriMesh>,
-) -> anyhow::Result<(Vec<(BuildQuality, RtCoreTracer)>, Vec<Summary>)> {
+) -> anyhow::Result<(Vec<Built>, Vec<Summary>)> {
     let qualities = BuildQuality::ALL;
     let rounds = if context.quick { 1 } else { VERDICT_ROUNDS };
     let mut secs = vec![vec![]; qualities.len()];

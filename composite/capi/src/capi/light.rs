@@ -41,6 +41,33 @@ impl GasValues for Densities {
             }
         }
     }
+
+    #[inline(always)]
+    fn row<const N: usize>(&self, first: UVec3) -> [f64; N] {
+        let [sx, sy, sz] = self.strides;
+        let number =
+            at(at(at(self.data, first.z.into(), sz), first.y.into(), sy), first.x.into(), sx);
+        let mut row = [0.0; N];
+        // SAFETY: nodes of the brick, as above; those of a row follow each other without gaps
+        // where their stride is the size of a number.
+        unsafe {
+            match (self.is_float, sx) {
+                (true, 4) => {
+                    let values = number.cast::<[f32; N]>().read_unaligned();
+                    for (value, number) in row.iter_mut().zip(values) {
+                        *value = number.into();
+                    }
+                }
+                (false, 8) => row = number.cast::<[f64; N]>().read_unaligned(),
+                _ => {
+                    for (n, value) in row.iter_mut().enumerate() {
+                        *value = self.density(UVec3 { x: first.x + n as u32, ..first });
+                    }
+                }
+            }
+        }
+        row
+    }
 }
 
 /// Fills a shot; `struct_bytes` is sizeof of the structure.

@@ -32,6 +32,15 @@ impl<V: GasValues> GasValues for Densities<V> {
     fn density(&self, node: UVec3) -> f64 {
         self.unit * self.values.density(node)
     }
+
+    #[inline(always)]
+    fn row<const N: usize>(&self, first: UVec3) -> [f64; N] {
+        let mut row = self.values.row::<N>(first);
+        for value in &mut row {
+            *value *= self.unit;
+        }
+        row
+    }
 }
 
 /// Values one behind the other.

@@ -60,6 +60,16 @@ impl Gas {
 pub trait GasValues: Sync {
     /// The density at a node, counted from the first of the box; not finite where there is no gas.
     fn density(&self, node: UVec3) -> f64;
+
+    /// The densities at `N` nodes that follow each other along x.
+    #[inline(always)]
+    fn row<const N: usize>(&self, first: UVec3) -> [f64; N] {
+        let mut row = [0.0; N];
+        for (n, value) in row.iter_mut().enumerate() {
+            *value = self.density(UVec3 { x: first.x + n as u32, ..first });
+        }
+        row
+    }
 }
 
 /// The box of nodes that one rank has.
@@ -114,10 +124,38 @@ impl<'a, T: Copy> Strided<'a, T> {
     }
 }
 
+impl<T> Strided<'_, T> {
+    #[inline(always)]
+    fn place(&self, node: UVec3) -> usize {
+        let [sx, sy, sz] = self.strides;
+        node.x as usize * sx + node.y as usize * sy + node.z as usize * sz
+    }
+}
+
 impl<T: Copy + Into<f64> + Sync> GasValues for Strided<'_, T> {
+    #[inline(always)]
     fn density(&self, node: UVec3) -> f64 {
-        let [x, y, z] = node.to_array().map(|n| n as usize);
-        self.values[x * self.strides[0] + y * self.strides[1] + z * self.strides[2]].into()
+        self.values[self.place(node)].into()
+    }
+
+    #[inline(always)]
+    fn row<const N: usize>(&self, first: UVec3) -> [f64; N] {
+        let stride = self.strides[0];
+        let values = &self.values[self.place(first)..];
+        let mut row = [0.0; N];
+        match (stride, values.first_chunk::<N>()) {
+            (1, Some(values)) => {
+                for (value, &number) in row.iter_mut().zip(values) {
+                    *value = number.into();
+                }
+            }
+            _ => {
+                for (n, value) in row.iter_mut().enumerate() {
+                    *value = values[n * stride].into();
+                }
+            }
+        }
+        row
     }
 }
 
@@ -140,15 +178,36 @@ impl<'a, V> Optical<'a, V> {
     }
 }
 
+impl<V> Optical<'_, V> {
+    /// A node of the whole lattice, counted from the first of the brick.
+    #[inline(always)]
+    fn node(&self, [x, y, z]: [usize; 3]) -> UVec3 {
+        UVec3::new(x as u32, y as u32, z as u32) - self.brick.first
+    }
+
+    /// n/n0 - 1 = K (rho - rho0) / n0: no difference of two indices near 1.
+    #[inline(always)]
+    fn of_density(&self, density: f64) -> f64 {
+        (density - self.reference_density) * self.eps_per_density
+    }
+}
+
 impl<V: GasValues> Brick for Optical<'_, V> {
     fn cells(&self) -> [[usize; 3]; 2] {
         self.cells
     }
 
-    #[inline]
+    #[inline(always)]
     fn eps(&self, node: [usize; 3]) -> f64 {
-        let node = UVec3::from(node.map(|n| n as u32)) - self.brick.first;
-        // n/n0 - 1 = K (rho - rho0) / n0: no difference of two indices near 1.
-        (self.brick.values.density(node) - self.reference_density) * self.eps_per_density
+        self.of_density(self.brick.values.density(self.node(node)))
+    }
+
+    #[inline(always)]
+    fn row<const N: usize>(&self, first: [usize; 3]) -> [f64; N] {
+        let mut row = self.brick.values.row::<N>(self.node(first));
+        for value in &mut row {
+            *value = self.of_density(*value);
+        }
+        row
     }
 }

@@ -4,8 +4,9 @@
 //! Each rank has the density at the nodes of a box, with as many layers around its own cells as the
 //! interpolant's [`Stencil`] needs: none for trilinear interpolation,
 //! one for trilinear gradients. Where a ray leaves these cells, its state goes to the rank that has
-//! the next one (72 bytes: `wire.rs`). Ranks work in rounds: each moves the rays that it has as far
-//! as it can, then all exchange what has left. A ray needs as many rounds as it changes bricks.
+//! the next one (72 bytes: `wire.rs`). Ranks work in rounds: each moves the first of the rays that
+//! it has as far as it can, then all exchange what has left. A round has a share of the rays only,
+//! so that a rank whose rays come from others begins while these still move theirs.
 //!
 //! Every step of a ray takes one sample, at a place that follows from its state
 //! ([`schlieren::march::InBricks`]). So the picture has the same bits for any number of ranks and
@@ -109,7 +110,7 @@ pub struct LightReport {
     pub rays_moved: u64,
     /// Rays that this rank sent to others.
     pub rays_sent: u64,
-    /// Rounds until no rank had a ray left.
+    /// Exchanges until no rank had a ray left.
     pub rounds: u32,
     /// Bytes that this rank sent.
     pub bytes_sent: u64,

@@ -1,4 +1,5 @@
-//! Rays that go from brick to brick: rounds of moving those at hand and exchanging those that left.
+//! Rays that go from brick to brick: rounds of moving the first of those at hand and exchanging those
+//! that left.
 use super::gas::{GasValues, Optical};
 use super::wire::{EXIT_WORDS, RAY_WORDS, push_exit, push_ray, read_exit, read_ray};
 use super::{LightOptions, LightReport, Setup};
@@ -10,10 +11,16 @@ use rt_core::volume::Brick;
 use schlieren::film::traced::{corners, start_of_corner};
 use schlieren::march::{Progress, RayState};
 use schlieren::path::{Exit, Start};
+use std::collections::VecDeque;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Rays between two signs of life.
 const BATCH: usize = 512;
+
+/// Rounds in which a rank would move the rays of all corners. With few, ranks wait for those that
+/// have the rays first: with one, bricks one behind the other along the light work one after the
+/// other. With many, ranks wait for each other more often, for as long as a small message takes.
+const SHARES: usize = 32;
 
 /// A ray that this rank has: its number, and its state.
 type Ray = (u32, RayState);
@@ -33,15 +40,19 @@ pub(super) fn trace<V: GasValues>(
     let count = corners(&setup.framing);
     let start = |number: u32| start_of_corner(&setup.framing, number as usize);
     let mut report = LightReport { rays: count as u64, ..LightReport::default() };
-    let mut rays = own.map_or(Vec::new(), |_| first_rays(setup, bricks, rank));
+    let mut rays: VecDeque<Ray> =
+        own.map_or(Vec::new(), |_| first_rays(setup, bricks, rank)).into();
     let mut left = Vec::new();
-    // Every ray takes a sample in every round, so honest ranks need no more of them.
-    let most_rounds = setup.march.most_samples();
+    let share = count.div_ceil(SHARES).max(BATCH);
+    // Rays are moved in the order in which they came, and a rank never has more than all. So each
+    // takes a sample at least every so many rounds, and honest ranks need no more rounds than this.
+    let most_rounds = count.div_ceil(share) as u64 * u64::from(setup.march.most_samples());
     loop {
-        // ---- The rays at hand, as far as this brick goes.
-        report.rays_moved += rays.len() as u64;
+        // ---- The first rays at hand, as far as this brick goes.
+        let round: Vec<Ray> = rays.drain(..rays.len().min(share)).collect();
+        report.rays_moved += round.len() as u64;
         let moved = match own {
-            Some(own) => move_rays(channel, setup, own, std::mem::take(&mut rays), options),
+            Some(own) => move_rays(channel, setup, own, round, options),
             None => Vec::new(),
         };
         let mut outgoing: Vec<Vec<u32>> = vec![Vec::new(); size];
@@ -57,17 +68,18 @@ pub(super) fn trace<V: GasValues>(
             }
         }
         // ---- Those that left it.
-        let lengths: Vec<u32> = outgoing.iter().map(|words| words.len() as u32).collect();
+        let mut lengths: Vec<u32> = outgoing.iter().map(|words| words.len() as u32).collect();
+        lengths.push(rays.len() as u32);
         let lengths = channel.all_gather(&lengths)?;
         if lengths.iter().flatten().all(|length| *length == 0) {
             break;
         }
-        if report.rounds >= most_rounds {
+        if u64::from(report.rounds) >= most_rounds {
             let from = lengths.iter().position(|l| l.iter().any(|n| *n > 0)).unwrap_or(rank);
             let reason = format!("rays of light after {most_rounds} rounds: no ray needs so many");
             return Err(channel.announced_error(from, reason));
         }
-        report.rounds += 1;
+        report.rounds += u32::from(size > 1);
         for step in 1..size {
             let to = (rank + step) % size;
             if !outgoing[to].is_empty() {
@@ -90,12 +102,13 @@ pub(super) fn trace<V: GasValues>(
             for chunk in words.as_chunks().0 {
                 let (number, state) = read_ray(chunk);
                 let is_ray = (number as usize) < count
+                    && rays.len() < count
                     && own.is_some()
                     && setup.march.is_possible(&start(number), &state);
                 if !is_ray {
                     return Err(fault());
                 }
-                rays.push((number, state));
+                rays.push_back((number, state));
             }
             Ok(())
         })?;
@@ -157,26 +170,34 @@ fn move_rays<V: GasValues>(
     channel: &mut RankChannel<'_>,
     setup: &Setup,
     own: &Optical<'_, V>,
-    mut rays: Vec<Ray>,
+    rays: Vec<Ray>,
     options: &LightOptions,
 ) -> Vec<(Ray, Progress)> {
-    let advance = |(number, state): &mut Ray| {
-        let start: Start = start_of_corner(&setup.framing, *number as usize);
-        let progress = setup.march.advance(&start, state, own);
-        ((*number, *state), progress)
+    let advance = |rays: &[Ray]| {
+        let started = |&(number, state): &Ray| {
+            let start: Start = start_of_corner(&setup.framing, number as usize);
+            (start, state)
+        };
+        let mut states: Vec<(Start, RayState)> = rays.iter().map(started).collect();
+        let mut progress = vec![None; rays.len()];
+        setup.march.advance_all(&mut states, own, |i, how_far| progress[i] = Some(how_far));
+        let moved = rays.iter().zip(states).zip(progress);
+        moved
+            .filter_map(|((ray, (_, state)), how_far)| Some(((ray.0, state), how_far?)))
+            .collect::<Vec<_>>()
     };
     if options.parallel {
         return channel.in_background(|steps: &AtomicUsize| {
-            let batch = |rays: &mut [Ray]| {
+            let batch = |rays: &[Ray]| {
                 steps.fetch_add(1, Ordering::Relaxed);
-                rays.iter_mut().map(advance).collect::<Vec<_>>()
+                advance(rays)
             };
-            rays.par_chunks_mut(BATCH).flat_map_iter(batch).collect()
+            rays.par_chunks(BATCH).flat_map_iter(batch).collect()
         });
     }
     let mut moved = Vec::with_capacity(rays.len());
-    for batch in rays.chunks_mut(BATCH) {
-        moved.extend(batch.iter_mut().map(advance));
+    for batch in rays.chunks(BATCH) {
+        moved.extend(advance(batch));
         channel.alive();
     }
     moved

@@ -116,6 +116,77 @@ fn a_lattice_in_bricks_has_the_bits_of_the_lattice_in_one_piece() {
 }
 
 #[test]
+fn a_ray_has_the_same_bits_beside_any_others_and_at_every_level() {
+    let field = field();
+    for interpolant in [Interpolant::Trilinear, Interpolant::TrilinearGradient] {
+        for view in views() {
+            let march = InBricks::new(&lattice(), view, interpolant, 0.7).expect("a march");
+            let (alone, _) = traced(&march, &field, &[]);
+            let whole = part(&march, &field, [[0; 3], DIMS]);
+            let mut levels = vec![fearless_simd::Level::new()];
+            #[cfg(target_arch = "x86_64")]
+            levels
+                .extend([fearless_simd::Level::Sse2(levels[0].as_sse2().expect("part of x86-64"))]);
+            #[cfg(target_arch = "x86_64")]
+            levels.extend(levels[0].as_avx2().map(fearless_simd::Level::Avx2));
+            for level in levels {
+                let march = march.clone().at_simd_level(level);
+                let mut rays: Vec<_> =
+                    starts().into_iter().map(|start| (start, RayState::default())).collect();
+                let mut exits = vec![None; rays.len()];
+                march.advance_all(&mut rays, &whole, |i, progress| {
+                    let Progress::Left(exit) = progress else { panic!("it has all cells") };
+                    assert!(exits[i].replace(exit).is_none(), "ray {i} ends twice");
+                });
+                let exits: Vec<_> = exits.into_iter().flatten().collect();
+                assert!(exits == alone, "{interpolant:?}, {level:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_corner_without_gas_beside_the_stencil_does_not_end_light() {
+    // Samples read rows of four nodes, also where only the middle two have weights.
+    let field = field();
+    let view = views()[0];
+    let march =
+        InBricks::new(&lattice(), view, Interpolant::TrilinearGradient, 1.0).expect("a march");
+    let hole = [4, 9, 11];
+    struct Holed<'a>(&'a Field, [usize; 3]);
+    impl Brick for Holed<'_> {
+        fn cells(&self) -> [[usize; 3]; 2] {
+            [[0; 3], DIMS.map(|n| n - 1)]
+        }
+        fn eps(&self, node: [usize; 3]) -> f64 {
+            let [i, j, k] = node;
+            let value = f64::from(self.0.eps()[(k * DIMS[1] + j) * DIMS[0] + i]);
+            if node == self.1 { f64::NAN } else { value }
+        }
+    }
+    let exit_at = |cell: [f64; 2], brick: &Holed<'_>| {
+        let at_m = [cell[0] * SPACING_M[0], cell[1] * SPACING_M[1]];
+        let centre_m = field.centre_m();
+        let position_m = [(at_m[0] - centre_m.x) as f32, (at_m[1] - centre_m.y) as f32];
+        let start = Start { position_m, tilt_rad: [0.0; 2] };
+        match march.advance(&start, &mut RayState::default(), brick) {
+            Progress::Left(exit) => exit,
+            Progress::NeedsCell(cell) => panic!("{cell:?} is there"),
+        }
+    };
+    let (whole, holed) = (Holed(&field, [usize::MAX; 3]), Holed(&field, hole));
+    // The hole is a corner of the 4 x 4 nodes around these rays, with no weight.
+    for cell in [[5.4, 10.4], [2.6, 10.4], [5.4, 7.6], [2.6, 7.6]] {
+        assert_eq!(exit_at(cell, &holed), exit_at(cell, &whole), "{cell:?}");
+        assert_eq!(exit_at(cell, &holed).status, Status::Free);
+    }
+    // Here it has one.
+    for cell in [[4.4, 10.4], [5.4, 9.4], [3.6, 8.6]] {
+        assert_eq!(exit_at(cell, &holed).status, Status::Masked, "{cell:?}");
+    }
+}
+
+#[test]
 fn exits_are_those_of_the_march_of_one_process() {
     let field = field();
     for interpolant in [Interpolant::Trilinear, Interpolant::TrilinearGradient] {
