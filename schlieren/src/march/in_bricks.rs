@@ -16,6 +16,9 @@
 
 mod four_rays;
 mod four_samples;
+mod undisturbed;
+
+pub use undisturbed::Undisturbed;
 
 use super::frame::{Frame, UndisturbedRay};
 use super::kernel_ray::steps_of;
@@ -107,6 +110,14 @@ pub trait Brick: Sync {
     /// The value of eps at a node of the whole lattice, one that a sample in these cells needs.
     /// Not finite where there is no gas.
     fn eps(&self, node: [usize; 3]) -> f64;
+
+    /// Whether every sample in a cell gives exactly 0, as far as the brick knows
+    /// ([`InBricks::undisturbed`]): these are not taken then.
+    #[inline(always)]
+    fn is_undisturbed(&self, cell: [usize; 3]) -> bool {
+        let _ = cell;
+        false
+    }
 
     /// The values at `N` nodes that follow each other along x, from `first`. Samples read whole
     /// rows; a brick whose values lie one behind the other along x reads them at once.
@@ -268,6 +279,13 @@ impl InBricks {
     fn cell_at(&self, at: DVec3) -> [usize; 3] {
         let [x, y, z] = self.dims;
         [cell(at.x, x).0, cell(at.y, y).0, cell(at.z, z).0]
+    }
+
+    /// Finds the cells of `brick` in which light is not bent at all, for its
+    /// [`Brick::is_undisturbed`]: reads all of its nodes once or more, on rayon's threads if
+    /// `parallel`.
+    pub fn undisturbed(&self, brick: &impl Brick, parallel: bool) -> Undisturbed {
+        Undisturbed::of(brick, self.dims, self.stencil.layers(), parallel)
     }
 
     /// Moves a ray as far as `brick` has the nodes.

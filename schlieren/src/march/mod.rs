@@ -40,7 +40,9 @@ pub use field_cache::{FieldCache, Projection};
 pub use frame::BlankCells;
 pub(crate) use frame::Frame;
 pub use full::{Full, FullOptions};
-pub use in_bricks::{Brick, InBricks, InBricksError, Lattice, Progress, RayState, Stencil};
+pub use in_bricks::{
+    Brick, InBricks, InBricksError, Lattice, Progress, RayState, Stencil, Undisturbed,
+};
 pub use integrator::{Integrator, InterpolatedMedium, Medium, Ray};
 #[cfg(feature = "gpu")]
 pub(crate) use kernel_ray::KernelOutput;

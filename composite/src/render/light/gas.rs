@@ -1,6 +1,6 @@
 //! A gas in bricks: its lattice, and the densities that this rank has, read where they are.
 use rt_core::glam::{DVec3, UVec3};
-use schlieren::march::{Brick, InBricks, Lattice};
+use schlieren::march::{Brick, InBricks, Lattice, Undisturbed};
 use schlieren::view::View;
 
 /// A gas on a lattice of nodes, without its values. The same on all ranks.
@@ -165,16 +165,27 @@ pub(super) struct Optical<'a, V> {
     cells: [[usize; 3]; 2],
     reference_density: f64,
     eps_per_density: f64,
+    undisturbed: Option<Undisturbed>,
 }
 
-impl<'a, V> Optical<'a, V> {
-    pub(super) fn new(gas: &Gas, brick: &'a GasBrick<'a, V>, cells: [[usize; 3]; 2]) -> Self {
-        Optical {
+impl<'a, V: GasValues> Optical<'a, V> {
+    /// Looks at all values once: on rayon's threads if `parallel`.
+    pub(super) fn new(
+        gas: &Gas,
+        brick: &'a GasBrick<'a, V>,
+        cells: [[usize; 3]; 2],
+        march: &InBricks,
+        parallel: bool,
+    ) -> Self {
+        let mut optical = Optical {
             brick,
             cells,
             reference_density: gas.reference_density,
             eps_per_density: gas.gladstone_dale_m3_per_kg / gas.n0(),
-        }
+            undisturbed: None,
+        };
+        optical.undisturbed = Some(march.undisturbed(&optical, parallel));
+        optical
     }
 }
 
@@ -195,6 +206,11 @@ impl<V> Optical<'_, V> {
 impl<V: GasValues> Brick for Optical<'_, V> {
     fn cells(&self) -> [[usize; 3]; 2] {
         self.cells
+    }
+
+    #[inline(always)]
+    fn is_undisturbed(&self, cell: [usize; 3]) -> bool {
+        self.undisturbed.as_ref().is_some_and(|cells| cells.contains(cell))
     }
 
     #[inline(always)]

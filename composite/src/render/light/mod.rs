@@ -191,7 +191,7 @@ fn in_channel<V: GasValues>(
         return Err(FrameError::Contradiction { what, field, values });
     }
 
-    let optical = brick.map(|brick| Optical::new(gas, brick, own));
+    let optical = brick.map(|brick| Optical::new(gas, brick, own, &setup.march, options.parallel));
     let (exits, mut report) = rays::trace(channel, &setup, &bricks, optical.as_ref(), options)?;
     let film = exits.map(|exits| developed(channel, &setup, exits, &mut report)).transpose()?;
     // A root that got what cannot be ends the photograph for all.

@@ -71,9 +71,10 @@ fn advance<S: Simd, B: Brick, const WIDE: bool>(
         // ---- Free lanes take the next rays.
         for lane in 0..4 {
             while four.rays[lane].is_none() && next < rays.len() {
-                let (start, state) = &rays[next];
+                let (start, state) = &mut rays[next];
                 let ray = march.frame.undisturbed(start, &mut known);
                 let all = march.samples(&ray);
+                pass_undisturbed(march, brick, cells, &ray, all, state);
                 if state.samples < all {
                     four.enter(lane, next, ray, all, state);
                 } else {
@@ -99,6 +100,37 @@ fn advance<S: Simd, B: Brick, const WIDE: bool>(
                 },
             );
         }
+    }
+}
+
+/// Counts the samples that change nothing: those of a ray that nothing has bent yet, in gas that
+/// bends nothing. The places of the samples are those of the lanes, to the bit.
+#[inline(always)]
+fn pass_undisturbed<B: Brick>(
+    march: &InBricks,
+    brick: &B,
+    [low, end]: [[usize; 3]; 2],
+    ray: &UndisturbedRay,
+    all_samples: u32,
+    state: &mut RayState,
+) {
+    let is_bent = RayState { samples: 0, ..*state } != RayState::default();
+    if is_bent || all_samples == 0 {
+        return;
+    }
+    let steps = all_samples - 2;
+    let step_m = (ray.range_m[1] - ray.range_m[0]) / f64::from(steps);
+    while state.samples <= steps {
+        let depth_m = match state.samples {
+            0 => 0.0,
+            k => (f64::from(k) - 0.5) * step_m,
+        };
+        let cell = march.cell_at(ray.at + ray.direction * (ray.range_m[0] + depth_m));
+        let is_here = (0..3).all(|c| (low[c]..end[c]).contains(&cell[c]));
+        if !is_here || !brick.is_undisturbed(cell) {
+            return;
+        }
+        state.samples += 1;
     }
 }
 
@@ -173,7 +205,12 @@ fn steps_until_one_ends<S: Simd, B: Brick, const WIDE: bool>(
         let here = bits(is_here & is_number) & !turned;
         let mut results = [zero; 4];
         for (lane, result) in results.iter_mut().enumerate() {
-            if here >> lane & 1 == 1 {
+            if here >> lane & 1 == 0 {
+                continue;
+            }
+            let [x, y, z] = &weights;
+            let cell = [x.cell[lane] as usize, y.cell[lane] as usize, z.cell[lane] as usize];
+            if !brick.is_undisturbed(cell) {
                 *result = sample::<S, B, WIDE>(simd, brick, march.dims, &weights, lane);
             }
         }

@@ -146,6 +146,61 @@ fn a_ray_has_the_same_bits_beside_any_others_and_at_every_level() {
 }
 
 #[test]
+fn samples_that_are_not_taken_would_have_changed_no_bit() {
+    // A front with still gas before and behind it, and a bubble.
+    let still = |p: DVec3| if (6e-3..9e-3).contains(&(p.y + 0.3 * p.x)) { gas(p) } else { 0.0 };
+    let field = Field::from_fn(DIMS, SPACING_M, DVec3::ZERO, N0, still).expect("a field");
+    struct Known<'a>(Part<'a>, Option<Undisturbed>, std::sync::atomic::AtomicUsize);
+    impl Brick for Known<'_> {
+        fn cells(&self) -> [[usize; 3]; 2] {
+            self.0.cells()
+        }
+        fn eps(&self, node: [usize; 3]) -> f64 {
+            self.0.eps(node)
+        }
+        fn is_undisturbed(&self, cell: [usize; 3]) -> bool {
+            let is = self.1.as_ref().is_some_and(|cells| cells.contains(cell));
+            self.2.fetch_add(usize::from(is), std::sync::atomic::Ordering::Relaxed);
+            is
+        }
+    }
+    for interpolant in [Interpolant::Trilinear, Interpolant::TrilinearGradient] {
+        for view in views() {
+            let march = InBricks::new(&lattice(), view, interpolant, 0.7).expect("a march");
+            let (expected, _) = traced(&march, &field, &[]);
+            let nodes = [[0; 3], DIMS];
+            let mut known = Known(part(&march, &field, nodes), None, 0.into());
+            for parallel in [false, true] {
+                known.1 = Some(march.undisturbed(&known.0, parallel));
+                let exit =
+                    |start: &Start| match march.advance(start, &mut RayState::default(), &known) {
+                        Progress::Left(exit) => exit,
+                        Progress::NeedsCell(cell) => panic!("{cell:?} is there"),
+                    };
+                let exits: Vec<_> = starts().iter().map(exit).collect();
+                assert!(exits == expected, "{interpolant:?}");
+            }
+            let skipped = known.2.into_inner();
+            assert!(skipped > 1000, "{skipped} samples were not taken");
+            // A brick may have fewer cells than a block, and begin anywhere.
+            let thin = part(&march, &field, [[3, 2, 5], [9, 9, 9]]);
+            let cells = march.undisturbed(&thin, false);
+            let [low, end] = thin.cells;
+            for x in low[0]..end[0] {
+                for y in low[1]..end[1] {
+                    for z in low[2]..end[2] {
+                        let corner = DVec3::new(x as f64, y as f64, z as f64);
+                        let at = |d: f64| still((corner + d) * DVec3::from(SPACING_M));
+                        let is_still = at(0.0) == 0.0 && at(1.0) == 0.0;
+                        assert!(is_still || !cells.contains([x, y, z]));
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
 fn a_corner_without_gas_beside_the_stencil_does_not_end_light() {
     // Samples read rows of four nodes, also where only the middle two have weights.
     let field = field();
