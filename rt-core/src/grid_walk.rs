@@ -40,11 +40,28 @@ impl IndexRay {
         IndexRay { o: (o / spacing).to_array(), d: d.to_array(), inverse: d.recip().to_array() }
     }
 
+    /// Whether all its numbers are finite, and it moves.
+    #[inline]
+    pub(crate) fn is_plain(&self) -> bool {
+        let mut plain = self.d != [0.0; 3];
+        for a in 0..3 {
+            let (still, finite) = (self.d[a] == 0.0, self.inverse[a].is_finite());
+            plain &= self.o[a].is_finite() && (still || finite);
+        }
+        plain
+    }
+
     /// Parameter at which the ray crosses plane number `i` of `axis`. Undefined for axes along
     /// which the ray does not move.
     #[inline]
     fn plane(&self, axis: usize, i: i64) -> f64 {
-        (i as f64 - self.o[axis]) * self.inverse[axis]
+        self.plane_at(axis, i as f64)
+    }
+
+    /// [`IndexRay::plane`] for the number of a plane as a float.
+    #[inline(always)]
+    pub(crate) fn plane_at(&self, axis: usize, i: f64) -> f64 {
+        (i - self.o[axis]) * self.inverse[axis]
     }
 
     /// The continuous index at `t`.

@@ -6,7 +6,7 @@
 //! most rays take no lock.
 
 use std::any::Any;
-use std::cell::RefCell;
+use std::cell::Cell;
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
@@ -18,8 +18,8 @@ const RECENT_LOG2: u32 = 4;
 type RecentPage = Option<(u64, u32, Arc<dyn Any + Send + Sync>)>;
 
 thread_local! {
-    static RECENTLY_USED: RefCell<[RecentPage; 1 << RECENT_LOG2]> =
-        const { RefCell::new([const { None }; 1 << RECENT_LOG2]) };
+    static RECENTLY_USED: [Cell<RecentPage>; 1 << RECENT_LOG2] =
+        const { [const { Cell::new(None) }; 1 << RECENT_LOG2] };
 }
 
 /// Where a thread keeps a page. Numbers of neighbouring bricks of a volume differ by powers of two,
@@ -103,23 +103,22 @@ impl<P: Paged> PageCache<P> {
         read: impl FnOnce() -> Option<P>,
         work: impl FnOnce(&P) -> R,
     ) -> Option<R> {
-        let place = recent_place(number);
-        let recent = RECENTLY_USED.with_borrow(|pages| match &pages[place] {
-            Some((key, page, held)) if (*key, *page) == (self.key, number) => Some(held.clone()),
-            _ => None,
-        });
-        let page = match recent.and_then(|held| held.downcast().ok()) {
-            Some(page) => page,
-            None => {
-                let page = self.page(number, read)?;
-                let held: RecentPage = Some((self.key, number, page.clone()));
-                // The page that was there is dropped after the borrow: that may take a while.
-                let _before = RECENTLY_USED
-                    .with_borrow_mut(|pages| std::mem::replace(&mut pages[place], held));
-                page
-            }
-        };
-        Some(work(&page))
+        // Taken out while it is at work, and put back: counting one more owner would be two atomic
+        // operations for each visit of a brick. Should `work` come to the same page, it finds it
+        // below, as other threads do.
+        RECENTLY_USED.with(|pages| {
+            let place = &pages[recent_place(number)];
+            let recent = match place.take() {
+                Some(recent) if (recent.0, recent.1) == (self.key, number) => recent,
+                other => {
+                    place.set(other);
+                    (self.key, number, self.page(number, read)? as Arc<dyn Any + Send + Sync>)
+                }
+            };
+            let result = recent.2.downcast_ref().map(work);
+            place.set(Some(recent));
+            result
+        })
     }
 
     fn page(&self, number: u32, read: impl FnOnce() -> Option<P>) -> Option<Arc<P>> {

@@ -160,3 +160,21 @@ pub(crate) fn smooth_gradient(
     }
     sum
 }
+
+/// [`smooth_gradient`] at the position `f` (0..=1) in a cell that no border of the lattice touches,
+/// with the values of the 4 x 4 x 4 points around it, x fastest.
+pub(crate) fn smooth_gradient_inside(v: &[f32; 64], f: Vec3, spacing: DVec3) -> Vec3 {
+    let width = 2.0 * spacing.as_vec3();
+    let mut sum = Vec3::ZERO;
+    for corner in 0..8 {
+        let bit = UVec3::new(corner & 1, corner >> 1 & 1, corner >> 2 & 1);
+        let weight = Vec3::select(bit.cmpeq(UVec3::ONE), f, Vec3::ONE - f).element_product();
+        if weight == 0.0 {
+            continue;
+        }
+        let i = (21 + bit.x + 4 * bit.y + 16 * bit.z) as usize;
+        let change = Vec3::new(v[i + 1] - v[i - 1], v[i + 4] - v[i - 4], v[i + 16] - v[i - 16]);
+        sum += weight * Vec3::select(width.cmpgt(Vec3::ZERO), change / width, Vec3::ZERO);
+    }
+    sum
+}

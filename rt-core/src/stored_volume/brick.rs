@@ -1,9 +1,11 @@
 //! A brick in memory: its values as they are stored, and the ranges of small blocks of them, so
 //! that rays pass over what no surface crosses.
 
-use super::layout::{BrickBox, ValueType};
+use super::active_cells::{ActiveCells, sides};
+use super::layout::{BRICK_CELLS, BrickBox, ValueType};
 use crate::paging::Paged;
 use glam::UVec3;
+use std::sync::OnceLock;
 
 /// Cells along the edge of a block.
 pub(super) const BLOCK_CELLS: u32 = 4;
@@ -63,6 +65,12 @@ impl Values {
         }
     }
 
+    /// For each row of `points` values, a bit for each that is below `iso`, and one for each that
+    /// is not.
+    pub(super) fn sides_of_rows(&self, points: usize, iso: f32, out: &mut [[u64; 2]]) {
+        with_values!(self, |values| sides(values, points, iso, out));
+    }
+
     /// Smallest and largest finite value, and whether there are others.
     pub(super) fn range(&self) -> ([f32; 2], bool) {
         let mut range = [f32::INFINITY, f32::NEG_INFINITY];
@@ -99,7 +107,9 @@ pub(super) struct StoredBrick {
     points: [usize; 3],
     blocks: [u32; 3],
     /// Smallest and largest finite value of each block, x fastest.
-    ranges: Vec<[f32; 2]>,
+    ranges: OnceLock<Vec<[f32; 2]>>,
+    /// Of the surfaces that asked for them first.
+    active: OnceLock<ActiveCells>,
 }
 
 impl StoredBrick {
@@ -108,8 +118,22 @@ impl StoredBrick {
         let cells = place.hi - place.lo;
         let blocks = cells.map(|n| n.div_ceil(BLOCK_CELLS));
         let points = place.points().to_array().map(|n| n as usize);
+        StoredBrick {
+            place,
+            values,
+            points,
+            blocks: blocks.to_array(),
+            ranges: OnceLock::new(),
+            active: OnceLock::new(),
+        }
+    }
+
+    /// Smallest and largest finite value of each block.
+    fn ranges_of_blocks(&self) -> Vec<[f32; 2]> {
+        let (cells, points) = (self.place.hi - self.place.lo, self.points);
+        let blocks = UVec3::from_array(self.blocks);
         let mut ranges = Vec::with_capacity(blocks.element_product() as usize);
-        with_values!(&values, |values| {
+        with_values!(&self.values, |values| {
             for z in 0..blocks.z {
                 for y in 0..blocks.y {
                     for x in 0..blocks.x {
@@ -129,14 +153,27 @@ impl StoredBrick {
                 }
             }
         });
-        StoredBrick { place, values, points, blocks: blocks.to_array(), ranges }
+        ranges
     }
 
     /// Smallest and largest finite value of the block whose lowest cell is `cell` of the lattice.
     #[inline]
     pub(super) fn block_range(&self, cell: UVec3) -> [f32; 2] {
         let [x, y, z] = ((cell - self.place.lo) / BLOCK_CELLS).to_array();
-        self.ranges[((z * self.blocks[1] + y) * self.blocks[0] + x) as usize]
+        let ranges = self.ranges.get_or_init(|| self.ranges_of_blocks());
+        ranges[((z * self.blocks[1] + y) * self.blocks[0] + x) as usize]
+    }
+
+    /// The cells that these surfaces may cross. `None` in a brick at a far face that is not whole,
+    /// and where surfaces with another number asked first: [`Self::block_range`] serves all.
+    #[inline]
+    pub(super) fn active_cells(&self, isovalues: &[f32], surfaces: u64) -> Option<&ActiveCells> {
+        if self.place.hi - self.place.lo != UVec3::splat(BRICK_CELLS) {
+            return None;
+        }
+        let make = || ActiveCells::new(&self.values, isovalues, surfaces);
+        let active = self.active.get_or_init(make);
+        active.are_of(surfaces).then_some(active)
     }
 
     /// Whether it has a point of the lattice.
@@ -169,6 +206,26 @@ impl StoredBrick {
         });
     }
 
+    /// The values of 4 x 4 x 4 points around a cell, x fastest, where it has them all.
+    #[inline]
+    pub(super) fn around(&self, cell: UVec3) -> Option<[f32; 64]> {
+        let inside = cell.cmpgt(self.place.lo).all() && (cell + 2).cmple(self.place.hi).all();
+        if !inside {
+            return None;
+        }
+        let first = self.index(cell - 1);
+        let mut around = [0.0; 64];
+        with_values!(&self.values, |values| {
+            for (n, four) in around.chunks_exact_mut(4).enumerate() {
+                let row = first + (n / 4 * self.points[1] + n % 4) * self.points[0];
+                for (to, &from) in four.iter_mut().zip(&values[row..row + 4]) {
+                    *to = number(from);
+                }
+            }
+        });
+        Some(around)
+    }
+
     /// The values at the corners of a cell of this brick, x fastest.
     #[inline]
     pub(super) fn corners(&self, cell: UVec3) -> [f32; 8] {
@@ -184,6 +241,8 @@ impl StoredBrick {
 
 impl Paged for StoredBrick {
     fn bytes(&self) -> usize {
-        self.values.bytes().len() + size_of_val(&self.ranges[..])
+        // What is made when a ray first asks for it counts from the start.
+        let blocks = self.blocks.iter().product::<u32>() as usize;
+        self.values.bytes().len() + blocks * size_of::<[f32; 2]>() + ActiveCells::BYTES
     }
 }

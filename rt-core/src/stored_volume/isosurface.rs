@@ -1,19 +1,21 @@
 //! Isosurfaces of stored volumes. The primitives are bricks.
 
+use super::active_walk::walk_active;
 use super::brick::{BLOCK_CELLS, StoredBrick};
 use super::read::StoredVolume;
 use crate::grid::{cell_of, gradient_in_cell};
-use crate::grid_walk::IndexRay;
+use crate::grid_walk::{Crossing, IndexRay};
 use crate::math::Aabb;
 use crate::ray::Ray;
 use crate::shapes::isosurface_cell::{
-    Root, check_isovalues, place_on, root_in_cell, smooth_gradient,
+    Root, check_isovalues, place_on, root_in_cell, smooth_gradient, smooth_gradient_inside,
 };
 use crate::shapes::{
     IsosurfaceNormals, Shape, ShapeError, ShapeHit, ShapeSurface, in_range, outward_box,
 };
 use glam::{DVec3, UVec3, Vec3};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// The surfaces value = isovalue of a stored volume, for one or several isovalues. Hits are those
 /// of an [`Isosurface`](crate::shapes::Isosurface) of the same lattice in memory, bit for bit: `u`
@@ -27,6 +29,8 @@ pub struct StoredIsosurface {
     /// Numbers of the bricks that a surface may cross.
     bricks: Vec<u32>,
     normals: IsosurfaceNormals,
+    /// Different for any two of a process: bricks keep which cells its surfaces cross.
+    number: u64,
 }
 
 impl StoredIsosurface {
@@ -44,7 +48,9 @@ impl StoredIsosurface {
         let bricks = (0..volume.num_bricks())
             .filter(|&number| crosses(&isovalues, volume.brick_range(number)))
             .collect();
-        Ok(StoredIsosurface { volume, isovalues, bricks, normals })
+        static NUMBERS: AtomicU64 = AtomicU64::new(0);
+        let number = NUMBERS.fetch_add(1, Ordering::Relaxed);
+        Ok(StoredIsosurface { volume, isovalues, bricks, normals, number })
     }
 
     /// The volume.
@@ -76,6 +82,18 @@ impl StoredIsosurface {
         let (lo, hi) = (cells(brick.place.lo), cells(brick.place.hi));
         let (t_min, t_max) = (f64::from(ray.t_min), f64::from(ray.t_max));
         let mut found = None;
+        let mut look = |crossing: &Crossing| {
+            found = cell_in(brick, crossing.cell).and_then(|cell| {
+                root_in_cell(&brick.corners(cell), &self.isovalues, &index_ray, crossing)
+            });
+            found.is_none()
+        };
+        if index_ray.is_plain()
+            && let Some(active) = brick.active_cells(&self.isovalues, self.number)
+        {
+            walk_active(&index_ray, lo, last, active, (t_min, t_max), look);
+            return found;
+        }
         // Walks of parts of the lattice have the cells and parameters of a walk of the whole, bit
         // for bit, so blocks can be left out.
         index_ray.walk(lo, hi, last, i64::from(BLOCK_CELLS), t_min, t_max, |block| {
@@ -85,13 +103,12 @@ impl StoredIsosurface {
                 return true;
             }
             let to = std::array::from_fn(|a| (from[a] + i64::from(BLOCK_CELLS)).min(hi[a]));
+            let mut goes_on = true;
             index_ray.walk(from, to, last, 1, t_min, t_max, |crossing| {
-                found = cell_in(brick, crossing.cell).and_then(|cell| {
-                    root_in_cell(&brick.corners(cell), &self.isovalues, &index_ray, crossing)
-                });
-                found.is_none()
+                goes_on = look(crossing);
+                goes_on
             });
-            found.is_none()
+            goes_on
         });
         found
     }
@@ -111,7 +128,10 @@ impl StoredIsosurface {
                 let corners = std::array::from_fn(|c| value(corner(c as u32)));
                 gradient_in_cell(&corners, f, layout.spacing)
             }
-            IsosurfaceNormals::Smooth => smooth_gradient(layout.dims, layout.spacing, at, value),
+            IsosurfaceNormals::Smooth => match brick.around(cell) {
+                Some(values) => smooth_gradient_inside(&values, f, layout.spacing),
+                None => smooth_gradient(layout.dims, layout.spacing, at, value),
+            },
         }
     }
 }

@@ -13,6 +13,8 @@
 //! by ordinary calls, not mapped; each has a checksum; and what goes wrong is kept
 //! ([`StoredVolume::failure`]) and makes the render fail with it ([`Shape::failure`]).
 
+mod active_cells;
+mod active_walk;
 mod brick;
 mod error;
 mod format;

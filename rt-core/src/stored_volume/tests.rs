@@ -154,9 +154,15 @@ fn hits_are_those_of_the_lattice_in_memory_bit_for_bit_for_all_types_of_values()
             let volume = Arc::new(StoredVolume::open(file.clone(), budget).expect("sound bytes"));
             assert_eq!(volume.range(), grid.range());
             let isovalues = isovalues(&numbers, shares);
-            let stored = StoredIsosurface::new(volume, &isovalues, normals).expect("isovalues");
+            let stored =
+                StoredIsosurface::new(volume.clone(), &isovalues, normals).expect("isovalues");
             let hits = assert_same_hits(Arc::new(stored), grid.clone(), normals, &rays);
             assert!(hits > 500, "{of:?}: {hits} hits");
+            // Bricks keep the active cells of the surface above: this one has the blocks' ranges.
+            let other = [isovalues[0] + 0.1 * (isovalues[0] - numbers[0])];
+            let other = StoredIsosurface::new(volume, &other, normals).expect("isovalues");
+            let hits = assert_same_hits(Arc::new(other), grid.clone(), normals, &rays[..1000]);
+            assert!(hits > 50, "{of:?}: {hits} hits of another surface");
         }
     }
 }
@@ -198,7 +204,8 @@ fn surfaces_end_at_values_that_are_not_finite_as_in_memory() {
 fn bricks_that_no_surface_crosses_are_never_read_and_memory_keeps_its_budget() {
     let (bytes, numbers) = values(ValueType::I16);
     let (file, _) = store(layout(ValueType::I16), &bytes);
-    let brick = 33 * 33 * 33 * 2 + 512 * 8;
+    // Its values, and a range and a word of bits for each of its blocks.
+    let brick = 33 * 33 * 33 * 2 + 2 * 512 * 8;
     for budget in [0, 2 * brick, usize::MAX] {
         let volume = Arc::new(StoredVolume::open(file.clone(), budget).expect("sound bytes"));
         let isovalues = isovalues(&numbers, &[0.97]);
