@@ -40,13 +40,14 @@ impl IndexRay {
         IndexRay { o: (o / spacing).to_array(), d: d.to_array(), inverse: d.recip().to_array() }
     }
 
-    /// Whether all its numbers are finite, and it moves.
+    /// Whether all its numbers and their reciprocals are finite, and it moves.
     #[inline]
     pub(crate) fn is_plain(&self) -> bool {
         let mut plain = self.d != [0.0; 3];
         for a in 0..3 {
-            let (still, finite) = (self.d[a] == 0.0, self.inverse[a].is_finite());
-            plain &= self.o[a].is_finite() && (still || finite);
+            // The reciprocal of an infinite number is zero.
+            let finite = self.inverse[a].is_finite() && self.inverse[a] != 0.0;
+            plain &= self.o[a].is_finite() && (self.d[a] == 0.0 || finite);
         }
         plain
     }

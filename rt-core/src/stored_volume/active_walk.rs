@@ -46,8 +46,7 @@ struct BrickRay<'a> {
 
 /// Visits the active cells that a ray crosses within `[t_min, t_max]`, in order, until `visit`
 /// returns false. `lo` is the first cell of the brick, `last` the number of cells of the lattice,
-/// `active` the brick's active cells. The ray [is
-/// plain](IndexRay::is_plain).
+/// `active` the brick's active cells. The ray [is plain](IndexRay::is_plain).
 #[inline(always)]
 pub(super) fn walk_active(
     ray: &IndexRay,
