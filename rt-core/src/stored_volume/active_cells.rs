@@ -1,8 +1,7 @@
 //! Which cells of a brick a surface may cross: one bit a cell. A ray that looks for the surface
 //! reads one word for 64 cells, and the values of cells that count alone.
 
-use super::brick::{BLOCK_CELLS, Values};
-use super::layout::BRICK_CELLS;
+use super::layout::{BLOCK_CELLS, BRICK_CELLS};
 
 /// Blocks along the edge of a whole brick.
 pub(super) const BLOCKS: usize = (BRICK_CELLS / BLOCK_CELLS) as usize;
@@ -31,14 +30,18 @@ impl ActiveCells {
     /// Bytes of the bits.
     pub(super) const BYTES: usize = size_of::<[u64; BLOCKS * BLOCKS * BLOCKS]>();
 
-    /// Those of `values`, as many as a whole brick has, for the surfaces with this number. A cell
-    /// is active where a corner is below an isovalue and another is not; what is not a number
-    /// counts as neither.
-    pub(super) fn new(values: &Values, isovalues: &[f32], surfaces: u64) -> ActiveCells {
+    /// Those of a brick for the surfaces with this number. For an isovalue, `sides_of_rows` gives
+    /// the two words of each row of points that [`sides`] makes. A cell is active where a corner is
+    /// below an isovalue and another is not; what is not a number counts as neither.
+    pub(super) fn new(
+        sides_of_rows: impl Fn(f32, &mut [[u64; 2]]),
+        isovalues: &[f32],
+        surfaces: u64,
+    ) -> ActiveCells {
         let mut cells = Box::new([0; BLOCKS * BLOCKS * BLOCKS]);
         let mut bits = vec![[0u64; 2]; POINTS * POINTS];
         for &iso in isovalues {
-            values.sides_of_rows(POINTS, iso, &mut bits);
+            sides_of_rows(iso, &mut bits);
             add(&bits, &mut cells);
         }
         let (mut some, mut bounds) = ([0; BLOCKS], [[BLOCKS as u8, 0]; 3]);
@@ -114,17 +117,13 @@ fn bits_of(bytes: &[u8]) -> u64 {
     bits
 }
 
-/// For each row of values, a bit for each that is below `iso`, and one for each that is not.
+/// For each row of a whole brick's values, a bit for each that is below `iso`, and one for each
+/// that is not.
 #[inline(always)]
-pub(super) fn sides<T: Copy + Into<f32>>(
-    values: &[T],
-    points: usize,
-    iso: f32,
-    out: &mut [[u64; 2]],
-) {
+pub(super) fn sides<T: Copy + Into<f32>>(values: &[T], iso: f32, out: &mut [[u64; 2]]) {
     // Rows are longer than a brick's by what makes them whole words.
     const WHOLE: usize = POINTS.next_multiple_of(8);
-    for (row, out) in values.chunks_exact(points).zip(out) {
+    for (row, out) in values.chunks_exact(POINTS).zip(out) {
         let (mut below, mut above) = ([0u8; WHOLE], [0u8; WHOLE]);
         for ((below, above), &value) in below.iter_mut().zip(&mut above).zip(row) {
             let value: f32 = value.into();
@@ -149,7 +148,7 @@ mod tests {
             values.push(if n % 31 == 0 { f32::NAN } else { value(x, y, z) });
         }
         let isovalues = [0.5, 15.5, 16.0];
-        let found = ActiveCells::new(&Values::F32(values.clone()), &isovalues, 3);
+        let found = ActiveCells::new(|iso, out| sides(&values, iso, out), &isovalues, 3);
         assert!(found.are_of(3) && !found.are_of(4));
         let n = BRICK_CELLS as usize;
         for cell in 0..n * n * n {

@@ -8,8 +8,7 @@
 //! planes between its cells.
 
 use super::active_cells::{ActiveCells, BLOCKS};
-use super::brick::BLOCK_CELLS;
-use super::layout::BRICK_CELLS;
+use super::layout::{BLOCK_CELLS, BRICK_CELLS};
 use crate::grid_walk::{Crossing, IndexRay};
 
 /// Cells along the edge of a block.
@@ -260,7 +259,7 @@ impl BrickRay<'_> {
 mod tests {
     use super::*;
     use crate::math::SplitMix64;
-    use crate::stored_volume::brick::Values;
+    use crate::stored_volume::active_cells::sides;
     use glam::DVec3;
 
     /// Rays through points, edges and planes of the lattice among others, so that they meet planes
@@ -272,9 +271,9 @@ mod tests {
         let mut r = SplitMix64::new(9);
         let mut met = 0;
         for share in [0.0, 0.0002, 0.01, 0.3] {
-            let values =
+            let values: Vec<f32> =
                 (0..33 * 33 * 33).map(|_| if r.unit() < share { 1.0 } else { 0.0 }).collect();
-            let active = ActiveCells::new(&Values::F32(values), &[0.5], 0);
+            let active = ActiveCells::new(|iso, out| sides(&values, iso, out), &[0.5], 0);
             let is_active = |cell: [i64; 3]| {
                 let at = [0, 1, 2].map(|a| (cell[a] - lo[a]) as usize);
                 let number = |size: usize, [x, y, z]: [usize; 3]| (z * size + y) * size + x;

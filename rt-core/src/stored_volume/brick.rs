@@ -2,13 +2,10 @@
 //! that rays pass over what no surface crosses.
 
 use super::active_cells::{ActiveCells, sides};
-use super::layout::{BRICK_CELLS, BrickBox, ValueType};
+use super::layout::{BLOCK_CELLS, BRICK_CELLS, BrickBox, ValueType};
 use crate::paging::Paged;
 use glam::UVec3;
 use std::sync::OnceLock;
-
-/// Cells along the edge of a block.
-pub(super) const BLOCK_CELLS: u32 = 4;
 
 /// Values of one type.
 pub(super) enum Values {
@@ -65,10 +62,10 @@ impl Values {
         }
     }
 
-    /// For each row of `points` values, a bit for each that is below `iso`, and one for each that
-    /// is not.
-    pub(super) fn sides_of_rows(&self, points: usize, iso: f32, out: &mut [[u64; 2]]) {
-        with_values!(self, |values| sides(values, points, iso, out));
+    /// For each row of a whole brick, a bit for each value that is below `iso`, and one for each
+    /// that is not.
+    fn sides_of_rows(&self, iso: f32, out: &mut [[u64; 2]]) {
+        with_values!(self, |values| sides(values, iso, out));
     }
 
     /// Smallest and largest finite value, and whether there are others.
@@ -171,7 +168,8 @@ impl StoredBrick {
         if self.place.hi - self.place.lo != UVec3::splat(BRICK_CELLS) {
             return None;
         }
-        let make = || ActiveCells::new(&self.values, isovalues, surfaces);
+        let sides = |iso: f32, out: &mut [[u64; 2]]| self.values.sides_of_rows(iso, out);
+        let make = || ActiveCells::new(sides, isovalues, surfaces);
         let active = self.active.get_or_init(make);
         active.are_of(surfaces).then_some(active)
     }

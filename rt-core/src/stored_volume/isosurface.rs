@@ -1,7 +1,8 @@
 //! Isosurfaces of stored volumes. The primitives are bricks.
 
 use super::active_walk::walk_active;
-use super::brick::{BLOCK_CELLS, StoredBrick};
+use super::brick::StoredBrick;
+use super::layout::BLOCK_CELLS;
 use super::read::StoredVolume;
 use crate::grid::{cell_of, gradient_in_cell};
 use crate::grid_walk::{Crossing, IndexRay};

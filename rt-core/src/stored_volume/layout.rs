@@ -6,6 +6,9 @@ use glam::{DVec3, UVec3};
 /// Cells along the edge of a brick.
 pub(crate) const BRICK_CELLS: u32 = 32;
 
+/// Cells along the edge of a block of a brick.
+pub(super) const BLOCK_CELLS: u32 = 4;
+
 /// How a value is stored. All are little-endian.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]

@@ -284,6 +284,40 @@ impl InBricks {
     /// Finds the cells of `brick` in which light is not bent at all, for its
     /// [`Brick::is_undisturbed`]: reads all of its nodes once or more, on rayon's threads if
     /// `parallel`.
+    ///
+    /// ```
+    /// use glam::DVec3;
+    /// use schlieren::interpolate::Interpolant;
+    /// use schlieren::march::{Brick, InBricks, Lattice, Undisturbed};
+    /// use schlieren::view::{Axis, View};
+    ///
+    /// /// Air with a warm layer at x >= 40, and what is known of it.
+    /// struct Air(Option<Undisturbed>);
+    /// impl Brick for Air {
+    ///     fn cells(&self) -> [[usize; 3]; 2] {
+    ///         [[0; 3], [63; 3]]
+    ///     }
+    ///     fn eps(&self, [x, ..]: [usize; 3]) -> f64 {
+    ///         if x >= 40 { -1e-5 } else { 0.0 }
+    ///     }
+    ///     fn is_undisturbed(&self, cell: [usize; 3]) -> bool {
+    ///         self.0.as_ref().is_some_and(|cells| cells.contains(cell))
+    ///     }
+    /// }
+    ///
+    /// let lattice = Lattice {
+    ///     dims: [64; 3],
+    ///     spacing_m: [1e-3; 3],
+    ///     origin_m: DVec3::ZERO,
+    ///     n0: 1.000_27,
+    /// };
+    /// let view = View::along(Axis::X, DVec3::splat(0.0315));
+    /// let march = InBricks::new(&lattice, view, Interpolant::TrilinearGradient, 1.0)?;
+    /// let mut air = Air(None);
+    /// air.0 = Some(march.undisturbed(&air, false));
+    /// assert!(air.is_undisturbed([10, 30, 30]) && !air.is_undisturbed([40, 30, 30]));
+    /// # Ok::<(), schlieren::march::InBricksError>(())
+    /// ```
     pub fn undisturbed(&self, brick: &impl Brick, parallel: bool) -> Undisturbed {
         Undisturbed::of(brick, self.dims, self.stencil.layers(), parallel)
     }

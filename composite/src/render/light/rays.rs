@@ -1,5 +1,5 @@
-//! Rays that go from brick to brick: rounds of moving the first of those at hand and exchanging those
-//! that left.
+//! Rays that go from brick to brick: rounds of moving the first of those at hand and exchanging
+//! those that left.
 use super::gas::{GasValues, Optical};
 use super::wire::{EXIT_WORDS, RAY_WORDS, push_exit, push_ray, read_exit, read_ray};
 use super::{LightOptions, LightReport, Setup};

@@ -1,5 +1,5 @@
-//! Samples of four rays. Each is a sum over the 4 x 4 x 4 nodes around a cell, with weights of value
-//! and derivative for each axis; eight nodes of these, or 32, have any weight.
+//! Samples of four rays. Each is a sum over the 4 x 4 x 4 nodes around a cell, with weights of
+//! value and derivative for each axis; eight nodes of these, or 32, have any weight.
 //!
 //! Weights are computed for four rays at once. The nodes of a ray are read in rows of four along x,
 //! which are summed over y and z first and over x at last.
