@@ -17,6 +17,7 @@
 //! # Ok::<(), datasets::image_io::ImageError>(())
 //! ```
 
+mod attribute_order;
 mod openexr;
 mod png;
 

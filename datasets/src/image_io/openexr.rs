@@ -7,6 +7,7 @@
 //! attributes, which other programs show under their own headings. Standard numbers have 32 bits,
 //! all others 64.
 
+use super::attribute_order::sort_attributes;
 use super::{ImageError, LayeredImage, Metadata, MetadataValue, Plane, format_error, io_error};
 use crate::atomic_file::write_atomically;
 use exr::meta::attribute::AttributeValue;
@@ -64,7 +65,9 @@ pub fn write_exr(path: &Path, image: &LayeredImage) -> Result<(), ImageError> {
         Layer::new(size, attributes, Encoding::SMALL_LOSSLESS, AnyChannels::sort(channels.into()));
     let mut bytes = Cursor::new(Vec::new());
     Image::from_layer(layer).write().to_buffered(&mut bytes).map_err(|e| format_error(path, e))?;
-    write_atomically(path, |w| w.write_all(bytes.get_ref())).map_err(io_error(path, "write"))
+    let mut bytes = bytes.into_inner();
+    sort_attributes(&mut bytes);
+    write_atomically(path, |w| w.write_all(&bytes)).map_err(io_error(path, "write"))
 }
 
 /// Reads the channels of the first part that has any; 16-bit and integer channels become f32.
@@ -233,6 +236,25 @@ mod tests {
             assert_eq!(bits(a), bits(b), "{}", a.name);
         }
         assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1, "no temporary file is left");
+    }
+
+    #[test]
+    fn two_files_of_an_image_have_the_same_bytes() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut image = image();
+        for n in 0..12 {
+            image.metadata.insert(format!("entry {n}"), f64::from(n).into());
+        }
+        let written = |n: usize| {
+            let path = dir.path().join(format!("{n}.exr"));
+            write_exr(&path, &image).unwrap();
+            assert_eq!(read_exr(&path).unwrap(), image);
+            std::fs::read(path).unwrap()
+        };
+        let first = written(0);
+        for n in 1..5 {
+            assert!(written(n) == first, "file {n} differs from the first");
+        }
     }
 
     #[test]
