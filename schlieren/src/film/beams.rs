@@ -174,12 +174,13 @@ fn deposit<const C: usize>(film: &Film<C>, t: [Corner; 3], area_px: f64) -> bool
         t.iter().map(|p| f64::from(p.energy[c])).sum::<f64>() / 3.0 * area_px
     });
     let points = t.map(|p| p.at_px);
+    // Pixels that the triangle may cover. Where it ends at the edge of one, it has no area beyond.
     let bounds = |axis: usize, size: u32| {
         let low = points.iter().map(|p| p[axis]).fold(f64::INFINITY, f64::min).floor();
-        let high = points.iter().map(|p| p[axis]).fold(f64::NEG_INFINITY, f64::max).floor();
-        (low.max(0.0) as i64, high.min(f64::from(size) - 1.0) as i64)
+        let high = points.iter().map(|p| p[axis]).fold(f64::NEG_INFINITY, f64::max).ceil();
+        (low.max(0.0) as i64)..(high.min(f64::from(size)) as i64)
     };
-    let ((x0, x1), (y0, y1)) = (bounds(0, framing.width), bounds(1, framing.height));
+    let (columns, rows) = (bounds(0, framing.width), bounds(1, framing.height));
     let area = polygon_area(&points);
     let add_share = |x: i64, y: i64, share: f64| {
         let shared = energy.map(|e| quantize((e * share) as f32));
@@ -196,10 +197,15 @@ fn deposit<const C: usize>(film: &Film<C>, t: [Corner; 3], area_px: f64) -> bool
         return inside;
     }
     let mut any = false;
-    for y in y0..=y1 {
-        let row = clip(clip(Polygon::new(&points), 1, y as f64, 1.0), 1, y as f64 + 1.0, -1.0);
-        for x in x0..=x1 {
-            let cell = clip(clip(row, 0, x as f64, 1.0), 0, x as f64 + 1.0, -1.0);
+    let triangle = Polygon::new(&points);
+    for y in rows {
+        let mut row = triangle;
+        row.clip(1, y as f64, 1.0);
+        row.clip(1, y as f64 + 1.0, -1.0);
+        for x in columns.clone() {
+            let mut cell = row;
+            cell.clip(0, x as f64, 1.0);
+            cell.clip(0, x as f64 + 1.0, -1.0);
             let share = polygon_area(cell.points()) / area;
             if share > 0.0 {
                 add_share(x, y, share);
@@ -228,34 +234,50 @@ impl Polygon {
         &self.corners[..self.len]
     }
 
+    /// Clips by a line across `axis` (Sutherland and Hodgman 1974): keeps the part above `limit` for
+    /// `side` = 1, the part below for -1. Where light is hardly bent, most triangles lie within one
+    /// pixel, so most clips end at the first two questions.
+    #[inline(always)]
+    fn clip(&mut self, axis: usize, limit: f64, side: f64) {
+        let len = self.len.min(8);
+        let mut distance = [0.0; 8];
+        let mut outside = 0u32;
+        for (i, p) in self.points().iter().enumerate() {
+            distance[i & 7] = side * (p[axis] - limit);
+            outside |= u32::from(distance[i & 7] < 0.0) << i;
+        }
+        if outside == 0 {
+            return;
+        }
+        if outside == (1 << len) - 1 {
+            self.len = 0;
+            return;
+        }
+        let mut out = Polygon { corners: [[0.0; 2]; 8], len: 0 };
+        for i in 0..len {
+            let next = if i + 1 == len { 0 } else { i + 1 };
+            let (p, q) = (self.corners[i], self.corners[next]);
+            let (p_outside, q_outside) = (outside >> i & 1, outside >> next & 1);
+            if p_outside == 0 {
+                out.push(p);
+            }
+            if p_outside != q_outside {
+                let t = distance[i] / (distance[i] - distance[next]);
+                let mut cut = [p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])];
+                cut[axis] = limit;
+                out.push(cut);
+            }
+        }
+        *self = out;
+    }
+
     fn push(&mut self, p: [f64; 2]) {
-        // Rounding cannot make a ninth corner of a convex polygon, but a NaN could.
+        // Rounding cannot make a ninth corner of a convex polygon.
         if self.len < self.corners.len() {
             self.corners[self.len] = p;
             self.len += 1;
         }
     }
-}
-
-/// Clips a polygon by a line across `axis` (Sutherland and Hodgman 1974): keeps the part above
-/// `limit` for `side` = 1, the part below for -1.
-fn clip(polygon: Polygon, axis: usize, limit: f64, side: f64) -> Polygon {
-    let mut out = Polygon { corners: [[0.0; 2]; 8], len: 0 };
-    let points = polygon.points();
-    for (i, p) in points.iter().enumerate() {
-        let q = points[(i + 1) % points.len()];
-        let (dp, dq) = (side * (p[axis] - limit), side * (q[axis] - limit));
-        if dp >= 0.0 {
-            out.push(*p);
-        }
-        if (dp >= 0.0) != (dq >= 0.0) {
-            let t = dp / (dp - dq);
-            let mut cut = [p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])];
-            cut[axis] = limit;
-            out.push(cut);
-        }
-    }
-    out
 }
 
 /// Area of a polygon of either orientation. Coordinates are relative to the first corner to avoid
