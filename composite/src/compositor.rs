@@ -5,7 +5,8 @@ use crate::comm::{CommError, Communicator};
 use crate::error::CompositeError;
 use crate::frame::{Frame, Image, Piece};
 use crate::frame_exchange::FrameExchange;
-use crate::in_memory;
+use crate::in_memory::{self, Merging};
+use crate::machine_groups::{MachineGroup, machine_groups};
 use crate::merge::Scratch;
 use crate::network_costs::NetworkCosts;
 use crate::pixel::{Composite, PixelFormat};
@@ -48,7 +49,10 @@ pub struct Options {
     pub slice_px: Option<usize>,
     /// Whether ranks that are processes of one machine merge the image in shared memory, if the
     /// strategy is [`Strategy::DirectSend`] or [`Strategy::Automatic`] and the image goes to one
-    /// rank. Without it, and where there is no such memory, they send messages.
+    /// rank. With several machines each merges what its ranks drew, and one rank of each sends
+    /// that on; for this, ranks of a machine must be neighbours in the order, and for premultiplied
+    /// colours all machines must have equally many ranks and both numbers be powers of two.
+    /// Otherwise, and where there is no such memory, all ranks send messages.
     pub in_memory: bool,
     /// The instruction set; `None` is the best this machine has. Changes the time, never the image.
     pub simd: Option<SimdLevel>,
@@ -177,10 +181,10 @@ impl<P: Composite> Compositor<P> {
         options.strategy.check()?;
         let size_px = (frame.width_px(), frame.height_px());
         let may_share = options.in_memory
-            && order.root_index.is_some()
             && matches!(options.strategy, Strategy::DirectSend | Strategy::Automatic);
-        let shares = may_share && comm.shared_segments().is_some();
-        if options.strategy == Strategy::Automatic && self.network.is_none() && !shares {
+        let groups = if may_share { machine_groups::<P>(comm, &order) } else { None };
+        let is_one_group = groups.as_ref().is_some_and(|groups| groups.len() == 1);
+        if options.strategy == Strategy::Automatic && self.network.is_none() && !is_one_group {
             self.network = Some(NetworkCosts::measure(comm, options.timeout)?);
         }
 
@@ -206,50 +210,68 @@ impl<P: Composite> Compositor<P> {
         }
 
         // Ranks of one machine merge in shared memory.
-        if let Some(root) = order
-            .root_index
-            .filter(|_| shares && in_memory::is_possible::<P>(&mut exchange, size_px))
-        {
-            let spare = self.spare.take();
-            let view = frame.view(drawn);
-            let done =
-                in_memory::run(&mut exchange, &view, size_px, root, options.depth, spare, kernels)?;
-            if let Some(image) = done {
-                let report = Report {
-                    strategy: Strategy::DirectSend,
-                    in_memory: true,
-                    total_secs: exchange.now() - begin,
-                    ..exchange.report
-                };
-                return Ok(CompositeOutput { image, piece: None, report });
+        let groups =
+            groups.filter(|groups| in_memory::is_possible::<P>(&mut exchange, size_px, groups));
+        let mut view = frame.view(drawn);
+        let mut machine_image = None;
+        if let Some(groups) = &groups {
+            let among_others = groups.len() > 1;
+            let own = groups.iter().position(|group| group.members.contains(&order.own_index));
+            let group = &groups[own.unwrap_or(0)];
+            let part = group.drawn(&exchange.drawn);
+            let (rows, depths, spare) = match among_others {
+                true => (part.y0..part.y1, true, &mut self.node_image),
+                false => (0..size_px.1, options.depth, &mut self.spare),
+            };
+            let merging = Merging { view, size_px, group, rows, depths, among_others };
+            let spare = spare.take();
+            if let Some(image) = in_memory::run(&mut exchange, &merging, spare, kernels)? {
+                exchange.report.in_memory = true;
+                exchange.report.machines = groups.len();
+                let leads = order.own_index == group.leader;
+                if !among_others || !leads {
+                    if among_others && options.final_barrier {
+                        exchange.barrier()?;
+                    }
+                    let mut report = exchange.report;
+                    report.total_secs = exchange.now() - begin;
+                    return Ok(CompositeOutput { image, piece: None, report });
+                }
+                // The leaders composite what their machines have merged.
+                let drawn = groups.iter().map(|group| group.drawn(&exchange.drawn)).collect();
+                let leaders: Vec<usize> = groups.iter().map(|group| group.leader).collect();
+                exchange.restrict_to(&leaders, drawn);
+                exchange.counts_nan = false;
+                machine_image = image;
+                if let Some(image) = &machine_image {
+                    view = Frame::of_image(image).view(part);
+                }
             }
         }
+        let root_index = match &groups {
+            Some(groups) if machine_image.is_some() => groups.iter().position(leads_root(&order)),
+            _ => order.root_index,
+        };
 
         // Run the strategy and collect its pieces.
         let slice_px = options.slice_px.unwrap_or_else(|| slice_px::<P>(exchange.comm));
         let strategy = match (options.strategy, &self.network) {
             (Strategy::Automatic, Some(network)) => {
-                network.choose::<P>(&exchange.drawn, order.root_index.is_some())
+                network.choose::<P>(&exchange.drawn, root_index.is_some())
             }
             (strategy, _) => strategy,
         };
         let plan = strategy.plan::<P>(
             &exchange.drawn,
             slice_px,
-            order.root_index.filter(|_| !exchange.comm.is_one_node()),
+            root_index.filter(|_| !exchange.comm.is_one_node()),
         );
         let pieces = plan.pieces(&exchange.drawn);
         let spare = self.spare.take();
-        let mut collector = Collector::new(
-            &mut exchange,
-            size_px,
-            order.root_index,
-            options.depth,
-            &pieces,
-            spare,
-        )?;
+        let mut collector =
+            Collector::new(&mut exchange, size_px, root_index, options.depth, &pieces, spare)?;
         let span = exchange.begin_span();
-        plan.run(&mut exchange, &frame.view(drawn), &mut collector, &mut self.scratch)?;
+        plan.run(&mut exchange, &view, &mut collector, &mut self.scratch)?;
         exchange.end_span(span, |report| &mut report.exchange_secs);
         let span = exchange.begin_span();
         let (image, piece) = collector.finish(&mut exchange)?;
@@ -260,8 +282,17 @@ impl<P: Composite> Compositor<P> {
         let mut report = exchange.report;
         report.strategy = strategy;
         report.total_secs = exchange.now() - begin;
+        if machine_image.is_some() {
+            self.node_image = machine_image;
+        }
         Ok(CompositeOutput { image, piece, report })
     }
+}
+
+/// Whether a group's leader is the rank that gets the image.
+fn leads_root(order: &CompositingOrder) -> impl Fn(&MachineGroup) -> bool + use<> {
+    let root = order.root_index;
+    move |group| root == Some(group.leader)
 }
 
 /// Aborts the group, unless another rank has.

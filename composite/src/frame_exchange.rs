@@ -86,6 +86,15 @@ impl<'a> FrameExchange<'a> {
         self.order[order_index]
     }
 
+    /// From now on the order has these of its ranks only, of which this rank is one, and they drew
+    /// in these rectangles. All other ranks still take part in collective calls.
+    pub(crate) fn restrict_to(&mut self, order_indices: &[usize], drawn: Vec<Rect>) {
+        let own_rank = self.order[self.order_index];
+        self.order = order_indices.iter().map(|&index| self.order[index]).collect();
+        self.order_index = self.order_index_of(own_rank);
+        self.drawn = drawn;
+    }
+
     fn order_index_of(&self, rank: usize) -> usize {
         // The order is a permutation, so every rank is in it.
         self.order.iter().position(|&other| other == rank).unwrap_or(rank)
@@ -184,6 +193,11 @@ impl<'a> FrameExchange<'a> {
     /// time out first, because it knows whose it is.
     pub(crate) fn barrier(&mut self) -> Result<(), CompositeError> {
         Ok(self.comm.barrier(self.timeout.saturating_mul(2))?)
+    }
+
+    /// Waits for the ranks of this machine.
+    pub(crate) fn machine_barrier(&mut self) -> Result<(), CompositeError> {
+        Ok(self.comm.machine_barrier(self.timeout.saturating_mul(2))?)
     }
 
     /// Gathers one number of every rank at every rank.

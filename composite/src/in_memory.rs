@@ -1,4 +1,5 @@
-//! Merging for ranks that are processes of one machine: shared memory instead of messages.
+//! Merging for ranks that are processes of one machine: shared memory instead of messages. Where
+//! the ranks are on several machines, each machine merges what its ranks drew.
 //!
 //! Each rank copies what it drew into its segment of shared memory. After a barrier, ranks take
 //! bands of rows of the image as long as there are any, and merge them straight from the segments.
@@ -11,6 +12,7 @@ use crate::error::CompositeError;
 use crate::frame::Image;
 use crate::frame_exchange::FrameExchange;
 use crate::layer::View;
+use crate::machine_groups::MachineGroup;
 use crate::pixel::Composite;
 use crate::rect::Rect;
 use crate::shared::{BAND_ROWS, Rows, merge_band};
@@ -41,7 +43,8 @@ impl Planes {
 /// Where the bands of the image are, in the segment of the rank that collects.
 struct Bands {
     width: usize,
-    height: usize,
+    /// Rows of the image that are merged.
+    rows: Range<usize>,
     first: usize,
     depths: bool,
     row_bytes: usize,
@@ -49,11 +52,12 @@ struct Bands {
 
 impl Bands {
     fn rows(&self, band: usize) -> Range<usize> {
-        band * BAND_ROWS..((band + 1) * BAND_ROWS).min(self.height)
+        let first = self.rows.start + band * BAND_ROWS;
+        first..(first + BAND_ROWS).min(self.rows.end)
     }
 
     fn count(&self) -> usize {
-        self.height.div_ceil(BAND_ROWS)
+        self.rows.len().div_ceil(BAND_ROWS)
     }
 
     /// Offset and length in bytes.
@@ -78,33 +82,54 @@ impl Bands {
     }
 }
 
-/// Whether this frame can be merged in shared memory; the same on all ranks. The handshake must be
-/// complete.
+/// Whether the ranks of each machine can merge this frame in shared memory; the same on all ranks.
+/// The handshake must be complete.
 pub(crate) fn is_possible<P: Composite>(
     exchange: &mut FrameExchange<'_>,
     (width_px, height_px): (u32, u32),
+    groups: &[MachineGroup],
 ) -> bool {
-    let laid: usize = exchange.drawn.iter().map(|rect| rect.pixels() * P::BYTES).sum();
     let image = Rect::of_size(width_px, height_px).pixels() * P::BYTES;
-    laid.saturating_add(image) <= MOST_BYTES && exchange.comm.shared_segments().is_some()
+    let bytes = |group: &MachineGroup| {
+        let drawn = &exchange.drawn[group.members.clone()];
+        drawn.iter().map(|rect| rect.pixels() * P::BYTES).fold(image, usize::saturating_add)
+    };
+    groups.iter().all(|group| bytes(group) <= MOST_BYTES)
+        && exchange.comm.shared_segments().is_some()
 }
 
-/// The image at the root; returns after a barrier. The outer `None` is returned on all ranks if
-/// there was not enough memory.
+/// What [`run`] merges.
+pub(crate) struct Merging<'a, P: Composite> {
+    /// What this rank drew.
+    pub(crate) view: View<'a, P>,
+    /// Columns and rows of the image.
+    pub(crate) size_px: (u32, u32),
+    /// The ranks of this machine.
+    pub(crate) group: &'a MachineGroup,
+    /// The rows of the image to merge.
+    pub(crate) rows: Range<u32>,
+    /// Whether the merged image has depths.
+    pub(crate) depths: bool,
+    /// Whether other machines merge too.
+    pub(crate) among_others: bool,
+}
+
+/// The image at the leader of the group, of which the given rows are merged; returns after a
+/// barrier of the machine. The outer `None` is returned on all ranks if there was not enough memory
+/// on a machine.
 pub(crate) fn run<P: Composite>(
     exchange: &mut FrameExchange<'_>,
-    view: &View<'_, P>,
-    (width_px, height_px): (u32, u32),
-    root: usize,
-    depths: bool,
+    merging: &Merging<'_, P>,
     spare: Option<Image<P>>,
     kernels: Kernels,
 ) -> Result<Option<Option<Image<P>>>, CompositeError> {
-    let (width, height) = (width_px as usize, height_px as usize);
-    let depths = depths && P::HAS_DEPTH;
+    let Merging { view, size_px: (width_px, height_px), group, .. } = merging;
+    let (width, root) = (*width_px as usize, group.leader);
+    let depths = merging.depths && P::HAS_DEPTH;
     let row_bytes = width * (size_of::<P::Color>() + if depths { 4 } else { 0 });
     let of_root = Planes::of::<P>(&exchange.drawn[root]).depths.end.next_multiple_of(ALIGNMENT);
-    let bands = Bands { width, height, first: of_root, depths, row_bytes };
+    let rows = merging.rows.start as usize..merging.rows.end as usize;
+    let bands = Bands { width, rows, first: of_root, depths, row_bytes };
 
     // Publish what this rank drew.
     let begin = exchange.comm.working_secs();
@@ -116,33 +141,43 @@ pub(crate) fn run<P: Composite>(
     }
     exchange.report.compress_secs += exchange.comm.working_secs() - begin;
     let span = exchange.begin_span();
-    exchange.barrier()?;
+    exchange.machine_barrier()?;
+    let Some(memory) = exchange.comm.shared_segments() else { return Ok(None) };
+    let mut has_memory = match memory.attach() {
+        Ok(has_memory) => has_memory,
+        Err(error) => return Err(exchange.comm.root_cause(error).into()),
+    };
+    if merging.among_others {
+        // A machine without enough memory is known to its own ranks only.
+        let all = exchange.all_gather_number(u64::from(has_memory))?;
+        has_memory = all.iter().all(|has| *has == 1);
+    }
     exchange.end_span(span, |report| &mut report.exchange_secs);
+    if !has_memory {
+        return Ok(None);
+    }
 
     // Merge bands, as long as there are any.
     let begin = exchange.comm.working_secs();
-    let (drawn, ranks): (Vec<Rect>, Vec<usize>) = (0..exchange.num_ranks())
-        .map(|order_index| (exchange.drawn[order_index], exchange.rank_of(order_index)))
-        .unzip();
     let own_index = exchange.order_index;
     let is_root = own_index == root;
-    let mut image = is_root.then(|| blank(width_px, height_px, depths, spare));
+    let mut image = is_root.then(|| blank(*width_px, *height_px, depths, spare));
     let mut own_bands = vec![false; if is_root { bands.count() } else { 0 }];
-    let Some(memory) = exchange.comm.shared_segments() else { return Ok(None) };
-    match memory.attach() {
-        Ok(true) => {}
-        Ok(false) => return Ok(None),
-        Err(error) => return Err(exchange.comm.root_cause(error).into()),
-    }
+    let own_rank = exchange.rank_of(own_index);
+    let root_rank = exchange.rank_of(root);
+    let members: Vec<(Rect, usize)> = group
+        .members
+        .clone()
+        .map(|order_index| (exchange.drawn[order_index], exchange.rank_of(order_index)))
+        .collect();
     let Some(memory) = exchange.comm.shared_segments() else { return Ok(None) };
     let memory: &dyn SharedSegments = memory;
-    let mut views: Vec<View<'_, P>> = Vec::with_capacity(ranks.len());
-    for (order_index, (rect, rank)) in drawn.iter().zip(&ranks).enumerate() {
-        match published_view(memory, *rank, rect) {
+    let mut views: Vec<View<'_, P>> = Vec::with_capacity(members.len());
+    for (rect, from) in &members {
+        match published_view(memory, *from, rect) {
             Ok(view) => views.push(view),
             Err(reason) => {
-                let (rank, from) = (ranks[own_index], ranks[order_index]);
-                return Err(CompositeError::Message { rank, from, reason });
+                return Err(CompositeError::Message { rank: own_rank, from: *from, reason });
             }
         }
     }
@@ -159,7 +194,7 @@ pub(crate) fn run<P: Composite>(
             own_bands[band] = true;
         } else {
             let (from, bytes) = bands.offset_and_len(band);
-            memory.write_band(ranks[root], from, bytes, &mut |bytes| {
+            memory.write_band(root_rank, from, bytes, &mut |bytes| {
                 let (colors, depths) = bands.split::<P>(band, bytes);
                 merge_band(kernels, &mut rows, &views, first as u32, colors, depths);
             });
@@ -167,7 +202,7 @@ pub(crate) fn run<P: Composite>(
     }
     exchange.report.blend_secs += exchange.comm.working_secs() - begin;
     let span = exchange.begin_span();
-    exchange.barrier()?;
+    exchange.machine_barrier()?;
     exchange.end_span(span, |report| &mut report.exchange_secs);
 
     // Copy the bands of the other ranks.
@@ -175,7 +210,7 @@ pub(crate) fn run<P: Composite>(
     if let (Some(image), Some(memory)) = (&mut image, exchange.comm.shared_segments()) {
         for band in (0..bands.count()).filter(|&band| !own_bands[band]) {
             let (from, bytes) = bands.offset_and_len(band);
-            let bytes = memory.band(ranks[root], from, bytes);
+            let bytes = memory.band(root_rank, from, bytes);
             let (colors, depths) = band_of(image, &bands, band);
             let (merged_colors, merged_depths) = bytes.split_at(size_of_val(colors));
             bytemuck::cast_slice_mut(colors).copy_from_slice(merged_colors);

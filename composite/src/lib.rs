@@ -60,6 +60,7 @@ mod frame;
 mod frame_exchange;
 mod in_memory;
 mod layer;
+mod machine_groups;
 mod merge;
 mod mix64;
 mod network_costs;

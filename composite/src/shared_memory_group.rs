@@ -200,6 +200,7 @@ impl<P: Composite> SharedMemoryRank<P> {
             total_secs: comm.now() - begin,
             nan_depths,
             in_memory: true,
+            machines: 1,
             ..Report::default()
         };
         Ok(CompositeOutput { image, piece: None, report })

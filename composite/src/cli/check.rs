@@ -79,6 +79,9 @@ struct CheckReport {
     counts: Vec<usize>,
     images: u64,
     images_differ: u64,
+    /// Images that machines with several ranks merged in their memories before one rank of each
+    /// sent messages; hard cases are not counted here.
+    merged_by_machine: u64,
     /// Counts of the hard cases.
     hard_images: u64,
     hard_images_differ: u64,
@@ -110,6 +113,7 @@ pub(super) fn check(
                 return Err(UsageError(cure).into());
             }
             let (mut images, mut images_differ, mut hard) = (0, 0, [0; 2]);
+            let mut merged_by_machine = 0;
             for &count in &counts {
                 if counts.len() > 1 {
                     comm.comm().barrier(timeout)?;
@@ -117,25 +121,26 @@ pub(super) fn check(
                 let Some(mut group) = FirstRanks::new(comm.comm(), count) else { continue };
                 for scene in Workload::ALL {
                     for size_px in SIZES_PX {
-                        for strategy in STRATEGIES {
-                            for same in
-                                one_frame(&mut group, scene, size_px, strategy, true, timeout)?
-                            {
-                                images += 1;
-                                images_differ += u64::from(!same);
-                            }
-                        }
+                        let options = |strategy, in_memory, order: Option<Vec<usize>>| Options {
+                            strategy,
+                            in_memory,
+                            order,
+                            timeout,
+                            ..Options::default()
+                        };
+                        let order = Some(scene.front_to_back(1, count));
+                        let mut all: Vec<Options> =
+                            STRATEGIES.map(|s| options(s, true, order.clone())).into();
                         if group.shared_segments().is_some() {
-                            for same in one_frame(
-                                &mut group,
-                                scene,
-                                size_px,
-                                Strategy::DirectSend,
-                                false,
-                                timeout,
-                            )? {
+                            all.push(options(Strategy::DirectSend, false, order));
+                            // In the order of ranks, in which those of a machine are neighbours.
+                            all.push(options(Strategy::DirectSend, true, None));
+                        }
+                        for options in all {
+                            for image in one_frame(&mut group, scene, size_px, &options)? {
                                 images += 1;
-                                images_differ += u64::from(!same);
+                                images_differ += u64::from(!image.same);
+                                merged_by_machine += u64::from(image.machines > 1);
                             }
                         }
                     }
@@ -170,6 +175,7 @@ pub(super) fn check(
                 counts,
                 images,
                 images_differ,
+                merged_by_machine,
                 hard_images,
                 hard_images_differ,
             })
@@ -206,16 +212,21 @@ pub(super) fn check(
     )
 }
 
-/// Composites one workload with depth and blended, in shared memory if wanted and possible. Returns
-/// on rank 0 whether each image has the bits of the reference.
+/// An image on rank 0.
+struct CheckedImage {
+    /// Whether it has the bits of the reference.
+    same: bool,
+    /// See [`crate::Report::machines`].
+    machines: usize,
+}
+
+/// Composites one workload with depth and blended. Returns what rank 0 finds.
 fn one_frame(
     comm: &mut dyn Communicator,
     scene: Workload,
     (width_px, height_px): (u32, u32),
-    strategy: Strategy,
-    in_memory: bool,
-    timeout: Duration,
-) -> anyhow::Result<Vec<bool>> {
+    options: &Options,
+) -> anyhow::Result<Vec<CheckedImage>> {
     let (rank, ranks) = (comm.rank(), comm.size());
     let draw = |rank: usize| {
         let mut drawn = SyntheticFrame::new(width_px, height_px);
@@ -225,39 +236,37 @@ fn one_frame(
         (drawn, glass)
     };
     let (drawn, glass) = draw(rank);
-    let order = scene.front_to_back(1, ranks);
+    let order = options.order.clone().unwrap_or_else(|| (0..ranks).collect());
     // All ranks' frames, in the order of compositing, on the rank that compares.
     let everybody: Vec<_> =
         if rank == 0 { order.iter().map(|&rank| draw(rank)).collect() } else { Vec::new() };
-    let options =
-        Options { strategy, in_memory, order: Some(order), timeout, ..Options::default() };
-
     let frame = Frame::<DepthPixel<[u8; 4]>>::with_depth(
         width_px,
         height_px,
         &drawn.colors,
         &drawn.depths,
     )?;
-    let depth = composite(comm, &frame, &options)?.image;
+    let depth = composite(comm, &frame, options)?;
     let frame = Frame::<PremultipliedPixel<[f32; 4]>>::premultiplied(width_px, height_px, &glass)?;
-    let blend = composite(comm, &frame, &options)?.image;
+    let blend = composite(comm, &frame, options)?;
 
-    let mut same = Vec::new();
-    if let Some(image) = depth {
+    let mut images = Vec::new();
+    let mut found = |same, machines| images.push(CheckedImage { same, machines });
+    if let Some(image) = depth.image {
         let frames: Result<Vec<_>, _> = everybody
             .iter()
             .map(|(drawn, _)| Frame::with_depth(width_px, height_px, &drawn.colors, &drawn.depths))
             .collect();
-        same.push(bits_are_equal(&image, &composite_serial(&frames?)?));
+        found(bits_are_equal(&image, &composite_serial(&frames?)?), depth.report.machines);
     }
-    if let Some(image) = blend {
+    if let Some(image) = blend.image {
         let frames: Result<Vec<_>, _> = everybody
             .iter()
             .map(|(_, glass)| Frame::premultiplied(width_px, height_px, glass))
             .collect();
-        same.push(bits_are_equal(&image, &composite_serial(&frames?)?));
+        found(bits_are_equal(&image, &composite_serial(&frames?)?), blend.report.machines);
     }
-    Ok(same)
+    Ok(images)
 }
 
 fn bits_are_equal<P: Composite>(a: &crate::Image<P>, b: &crate::Image<P>) -> bool {

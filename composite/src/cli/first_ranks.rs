@@ -56,6 +56,17 @@ impl Communicator for FirstRanks<'_> {
         if self.size == self.inner.size() { self.inner.shared_segments() } else { None }
     }
 
+    fn machines_with_shared_memory(&self) -> Option<&[usize]> {
+        if self.size == self.inner.size() { self.inner.machines_with_shared_memory() } else { None }
+    }
+
+    fn machine_barrier(&mut self, timeout: Duration) -> Result<(), CommError> {
+        if self.size == self.inner.size() {
+            return self.inner.machine_barrier(timeout);
+        }
+        self.barrier(timeout)
+    }
+
     fn send(
         &mut self,
         destination: usize,

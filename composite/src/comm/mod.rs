@@ -47,19 +47,21 @@ pub struct Arrival {
 }
 
 /// Memory that the ranks of a group on one machine share, with one segment for each rank. See
-/// [`Communicator::shared_segments`].
+/// [`Communicator::shared_segments`]. Ranks are those of the group, of which some may be on other
+/// machines; these have no segment here.
 ///
 /// For each frame all ranks call [`all_gather`](Communicator::all_gather), then each
-/// [`publish`](Self::publish)es its pixels. After a [barrier](Communicator::barrier) each
-/// [`attach`](Self::attach)es the segments of the others and takes bands until none are left, and a
-/// second barrier ends the frame. In any other order a rank may read half-written data.
+/// [`publish`](Self::publish)es its pixels. After a
+/// [barrier of the machine](Communicator::machine_barrier) each [`attach`](Self::attach)es the
+/// segments of the others and takes bands until none are left, and a second such barrier ends the
+/// frame. In any other order a rank may read half-written data.
 pub trait SharedSegments {
     /// Makes this rank's segment `bytes` long and calls `fill` to write the first `used` of them.
-    /// If there is not enough memory, [`attach`](Self::attach) tells all ranks.
+    /// If there is not enough memory, [`attach`](Self::attach) tells all ranks of the machine.
     fn publish(&mut self, bytes: usize, used: usize, fill: &mut dyn FnMut(&mut [u8]));
 
-    /// Opens the segments of all ranks. Returns false on all ranks if any segment could not be
-    /// made.
+    /// Opens the segments of all ranks of the machine. Returns false on all of them if any segment
+    /// could not be made.
     ///
     /// # Errors
     /// [`CommError::Transport`] if an existing segment cannot be opened here, or a rank has
@@ -113,10 +115,25 @@ pub trait Communicator {
         false
     }
 
-    /// Memory that all ranks share although they are processes, if there is any and all of them can
-    /// open it. Images need not be sent then.
+    /// Memory that the ranks of this machine share although they are processes, if there is any and
+    /// all of them can open it, on every machine. Images need not be sent between them then.
     fn shared_segments(&mut self) -> Option<&mut dyn SharedSegments> {
         None
+    }
+
+    /// The machine of every rank, numbered in any way, if the ranks of each have
+    /// [shared segments](Self::shared_segments). The same on all ranks.
+    fn machines_with_shared_memory(&self) -> Option<&[usize]> {
+        None
+    }
+
+    /// Waits until all ranks of this machine have called it, where they have
+    /// [shared segments](Self::shared_segments); else until all ranks have.
+    ///
+    /// # Errors
+    /// As [`barrier`](Self::barrier).
+    fn machine_barrier(&mut self, timeout: Duration) -> Result<(), CommError> {
+        self.barrier(timeout)
     }
 
     /// The reason why the group ended, if another rank has given up and this rank learns of it only

@@ -34,8 +34,8 @@ fn check(
     assert_eq!(checked["ranks"].to_string(), ranks);
     assert!(checked["transport"].as_str().is_some_and(|t| t.contains(transport)), "{checked}");
     // All processes of a launch share memory and merge each frame there; direct send is checked
-    // with messages too. Groups of some of the ranks send messages.
-    let besides = if arguments.contains(&"--mpi") { 24 } else { 0 };
+    // with messages and in the order of ranks too. Groups of some of the ranks send messages.
+    let besides = if arguments.contains(&"--mpi") { 48 } else { 0 };
     assert_eq!(
         (number("images"), number("images_differ")),
         (120 * counts.len() as u64 + besides, 0)
@@ -406,8 +406,8 @@ fn nodes_and_images(ran: &ProgramOutput) -> (u64, u64) {
 
 #[test]
 fn ranks_of_one_machine_find_each_other_without_the_variables_of_their_launcher() {
-    // Also merged in memory, which only ranks of one machine can do.
-    let in_memory = if cfg!(target_os = "linux") { 24 } else { 0 };
+    // Also by messages and in the order of ranks, where ranks of a machine share memory.
+    let in_memory = if cfg!(target_os = "linux") { 48 } else { 0 };
     if let Some(mpirun) = peer("RTSV_MPIRUN") {
         let none =
             ["-u OMPI_COMM_WORLD_LOCAL_SIZE -u OMPI_COMM_WORLD_LOCAL_RANK -u OMPI_COMM_WORLD_RANK"];
@@ -437,7 +437,8 @@ fn ranks_of_two_machines_do_not_believe_that_they_share_one() {
         let halves =
             ["-u OMPI_COMM_WORLD_LOCAL_SIZE COMPOSITE_NODE=of-$((OMPI_COMM_WORLD_RANK/2))"];
         let ran = launched(&mpirun, &[], &["-n", "3"], &halves, &[]);
-        assert_eq!(nodes_and_images(&ran), (2, 120));
+        let in_memory = if cfg!(target_os = "linux") { 48 } else { 0 };
+        assert_eq!(nodes_and_images(&ran), (2, 120 + in_memory));
     }
     if peer("RTSV_SMPIRUN").is_some() {
         let library = simulated_program();
@@ -446,6 +447,36 @@ fn ranks_of_two_machines_do_not_believe_that_they_share_one() {
         // Each simulated rank is on a host of its own.
         let ran = run(&["check", "--json", "--smpi", "-n", "5"], &variables);
         assert_eq!(nodes_and_images(&ran), (5, 120));
+    }
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn machines_with_several_ranks_merge_in_their_memories_first() {
+    let (openmpi, mpich) =
+        (("RTSV_MPIRUN", "OMPI_COMM_WORLD_RANK"), ("RTSV_MPIRUN_MPICH", "PMI_RANK"));
+    // 12 images with depth and 12 blended ones are in the order of ranks; those in the order of
+    // their scene may be merged so too.
+    for ((variable, rank), count, machine, machines, least_merged) in [
+        (openmpi, "8", "/2", 4, 24),
+        (openmpi, "8", "/4", 2, 24),
+        (mpich, "4", "/2", 2, 24),
+        // Two and three: blending them by machines would change bits.
+        (openmpi, "5", ">1", 2, 12),
+        // In turns: neighbours in the orders of some scenes only.
+        (openmpi, "4", "%2", 2, 0),
+    ] {
+        let Some(mpirun) = peer(variable) else { continue };
+        let environment = format!("COMPOSITE_NODE=of-$(({rank}{machine}))");
+        let hard = ["--hard", "--repeats", "50"];
+        let ran = launched(&mpirun, &[], &["-n", count], &[&environment], &hard);
+        let what = format!("{variable} {count} ranks {machine}: {}", ran.text);
+        assert_eq!(nodes_and_images(&ran), (machines, 168), "{what}");
+        let checked: serde_json::Value =
+            serde_json::from_str(ran.stdout.trim()).expect("one line of JSON");
+        let merged = checked["merged_by_machine"].as_u64().expect("a number");
+        assert!(merged >= least_merged, "{what}");
+        assert_eq!(checked["hard_images_differ"].as_u64(), Some(0), "{what}");
     }
 }
 

@@ -282,6 +282,9 @@ impl<'a> Bench<'a> {
             ours_min_ms: smallest(&ours_ms),
             rival_min_ms: smallest(&rivals_ms[best]),
             ours_strategy: match reports.last() {
+                Some(report) if report.machines > 1 => {
+                    format!("SharedMemory on {}, {:?}", report.machines, report.strategy)
+                }
                 Some(report) if report.in_memory => "SharedMemory".to_string(),
                 Some(report) => format!("{:?}", report.strategy),
                 None => format!("{strategy:?}"),

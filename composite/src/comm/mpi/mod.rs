@@ -94,7 +94,7 @@ pub struct MpiComm {
     /// See [`delay_after_collectives`](Self::delay_after_collectives).
     #[cfg(target_os = "linux")]
     delay_after_collectives: Duration,
-    /// What ranks of one machine share, if all of them could open it.
+    /// What the ranks of this machine share, if all ranks of all machines could open theirs.
     #[cfg(target_os = "linux")]
     shared: Option<shared_memory::SharedMemory>,
 }
@@ -499,13 +499,28 @@ impl Communicator for MpiComm {
     }
 
     #[cfg(target_os = "linux")]
+    fn machines_with_shared_memory(&self) -> Option<&[usize]> {
+        self.shared.as_ref().map(|_| self.nodes.as_slice())
+    }
+
+    #[cfg(target_os = "linux")]
+    fn machine_barrier(&mut self, timeout: Duration) -> Result<(), CommError> {
+        match self.collective_in_memory(None, timeout) {
+            Some(met) => met.map(|_| ()),
+            None => self.barrier(timeout),
+        }
+    }
+
+    #[cfg(target_os = "linux")]
     fn shared_segments(&mut self) -> Option<&mut dyn SharedSegments> {
         self.shared.as_mut().map(|shared| shared as &mut dyn SharedSegments)
     }
 
     fn barrier(&mut self, timeout: Duration) -> Result<(), CommError> {
         #[cfg(target_os = "linux")]
-        if let Some(met) = self.collective_in_memory(None, timeout) {
+        if self.is_one_node()
+            && let Some(met) = self.collective_in_memory(None, timeout)
+        {
             return met.map(|_| ());
         }
         if self.mpi.abi != Abi::Smpi {
@@ -530,7 +545,8 @@ impl Communicator for MpiComm {
         timeout: Duration,
     ) -> Result<Vec<Vec<u8>>, CommError> {
         #[cfg(target_os = "linux")]
-        if longest <= shared_memory::LONGEST
+        if self.is_one_node()
+            && longest <= shared_memory::LONGEST
             && mine.len() <= longest
             && let Some(gathered) = self.collective_in_memory(Some(mine), timeout)
         {

@@ -2,8 +2,8 @@
 
 use super::heartbeat::HeartbeatTimeout;
 use super::{
-    CommError, Communicator, MpiComm, NOTICE_INTERVAL, POLL_SLEEP, SPINS, STARTUP_TIMEOUT,
-    collective, shared_memory,
+    CommError, MpiComm, NOTICE_INTERVAL, POLL_SLEEP, SPINS, STARTUP_TIMEOUT, collective,
+    shared_memory,
 };
 use std::time::{Duration, Instant};
 
@@ -14,24 +14,32 @@ impl MpiComm {
         self.delay_after_collectives = behind_meetings;
     }
 
-    /// Sets up the shared memory, if all ranks are on one machine and all of them can map it.
+    /// Sets up the shared memory of each machine, if one has several ranks and all ranks can map
+    /// that of theirs.
     pub(super) fn share_memory(&mut self) -> Result<(), CommError> {
-        if self.size < 2 || !self.is_one_node() {
+        let machines = self.nodes.iter().max().map_or(0, |last| last + 1);
+        // Messages of simulated ranks take simulated time on one machine too.
+        if machines == self.size || self.mpi.abi == super::Abi::Smpi {
             return Ok(());
         }
-        let made =
-            if self.rank == 0 { shared_memory::SharedMemory::make(self.size).ok() } else { None };
+        let here = self.nodes[self.rank];
+        let ranks = (0..self.size).filter(|&rank| self.nodes[rank] == here).collect::<Vec<_>>();
+        let first = ranks[0];
+        let made = match first == self.rank {
+            true => shared_memory::SharedMemory::make(ranks.clone()).ok(),
+            false => None,
+        };
         let address = made.as_ref().map_or([0; 3], |made| made.1);
         let mine: &[u8] = bytemuck::cast_slice(&address);
         let gathered = collective::all_gather(self, mine, mine.len(), STARTUP_TIMEOUT)?;
-        let address: shared_memory::Address = match gathered[0].as_slice().try_into() {
+        let address: shared_memory::Address = match gathered[first].as_slice().try_into() {
             Ok(bytes) => bytemuck::cast::<[u8; 12], _>(bytes),
             Err(_) => [0; 3],
         };
         let shared = match made {
             Some((shared, _)) => Some(shared),
             None if address != [0; 3] => {
-                shared_memory::SharedMemory::map(self.rank, self.size, address).ok()
+                shared_memory::SharedMemory::map(self.rank, ranks, address).ok()
             }
             None => None,
         };
@@ -41,7 +49,8 @@ impl MpiComm {
         Ok(())
     }
 
-    /// A barrier of ranks that share memory, or an all-gather of strings, which it returns.
+    /// A barrier of the ranks of this machine, or an all-gather of their strings, which it returns.
+    /// `None` without shared memory.
     pub(super) fn collective_in_memory(
         &mut self,
         string: Option<&[u8]>,

@@ -42,7 +42,7 @@ const REFUSED: usize = 5;
 /// The collective call after which its segment was last written.
 const PUBLISHED: usize = 6;
 
-/// Where the table is: process and file of rank 0, and a nonce in the table, so that a process with
+/// Where the table is: process and file of the machine's first rank, and a nonce in the table, so that a process with
 /// the same number in another container is not mistaken for it.
 pub(super) type Address = [u32; 3];
 
@@ -130,10 +130,12 @@ struct Segment {
     mapping: Mapping,
 }
 
-/// The table and the segments of all ranks; see the module page.
+/// The table and the segments of the ranks of a machine; see the module page.
 pub(super) struct SharedMemory {
-    rank: usize,
-    size: usize,
+    /// The ranks of this machine, ascending. Entries of the table are in this order.
+    ranks: Vec<usize>,
+    /// This rank's place among them.
+    place: usize,
     table: Mapping,
     /// Kept open, so that others can open it.
     own_file: Option<File>,
@@ -150,43 +152,55 @@ fn table_bytes(size: usize) -> usize {
 }
 
 impl SharedMemory {
-    /// The table that this rank makes for all, and its address.
-    pub(super) fn make(size: usize) -> std::io::Result<(Self, Address)> {
-        let file = nameless_file(table_bytes(size))?;
+    /// The table that the first of these ranks makes for all, and its address.
+    pub(super) fn make(ranks: Vec<usize>) -> std::io::Result<(Self, Address)> {
+        let file = nameless_file(table_bytes(ranks.len()))?;
         let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
         let nonce = now.map_or(0, |since| since.subsec_nanos() ^ since.as_secs() as u32) | 1;
         let address = [std::process::id(), file.as_raw_fd() as u32, nonce];
-        let node = Self::of(0, size, file)?;
+        let node = Self::of(0, ranks, file)?;
         node.table.word(NONCE).store(nonce, Ordering::Release);
         Ok((node, address))
     }
 
-    /// The table that rank 0 has made.
+    /// The table that the first of `ranks` has made; `rank` must be one of them.
     pub(super) fn map(
         rank: usize,
-        size: usize,
+        ranks: Vec<usize>,
         [process, file, nonce]: Address,
     ) -> std::io::Result<Self> {
-        let node = Self::of(rank, size, file_of(process, file)?)?;
+        let place = ranks.iter().position(|&one| one == rank);
+        let place = place.ok_or(std::io::ErrorKind::InvalidInput)?;
+        let node = Self::of(place, ranks, file_of(process, file)?)?;
         let same = node.table.word(NONCE).load(Ordering::Acquire) == nonce;
         if same { Ok(node) } else { Err(std::io::ErrorKind::NotFound.into()) }
     }
 
-    fn of(rank: usize, size: usize, file: File) -> std::io::Result<Self> {
+    fn of(place: usize, ranks: Vec<usize>, file: File) -> std::io::Result<Self> {
         Ok(Self {
-            rank,
-            size,
-            table: Mapping::of(&file, table_bytes(size), true)?,
+            place,
+            table: Mapping::of(&file, table_bytes(ranks.len()), true)?,
             own_file: None,
-            _table_file: (rank == 0).then_some(file),
-            segments: (0..size).map(|_| None).collect(),
+            _table_file: (place == 0).then_some(file),
+            segments: ranks.iter().map(|_| None).collect(),
             arrivals: Cell::new(0),
             published: Cell::new(0),
+            ranks,
         })
     }
 
-    fn entry(&self, rank: usize, word: usize) -> &AtomicU32 {
-        self.table.word(ENTRY * (rank + 1) + word)
+    fn places(&self) -> std::ops::Range<usize> {
+        0..self.ranks.len()
+    }
+
+    /// The segment of a rank, if it is on this machine and has been opened.
+    fn segment_of(&self, rank: usize) -> Option<&Segment> {
+        let place = self.ranks.iter().position(|&one| one == rank)?;
+        self.segments[place].as_ref()
+    }
+
+    fn entry(&self, place: usize, word: usize) -> &AtomicU32 {
+        self.table.word(ENTRY * (place + 1) + word)
     }
 
     /// Enters the next collective call: a barrier, or (with a string) an all-gather. Wakes all
@@ -198,7 +212,7 @@ impl SharedMemory {
     pub(super) fn arrive(&self, string: Option<&[u8]>) {
         let number = self.arrivals.get().wrapping_add(1);
         self.arrivals.set(number);
-        let first = self.slot(self.rank);
+        let first = self.slot(self.place);
         self.table.word(first).store(number, Ordering::Relaxed);
         let length = string.map_or(BARRIER, |string| string.len() as u32);
         self.table.word(first + 1).store(length, Ordering::Relaxed);
@@ -207,8 +221,8 @@ impl SharedMemory {
             word[..four.len()].copy_from_slice(four);
             self.table.word(first + 2 + index).store(u32::from_ne_bytes(word), Ordering::Relaxed);
         }
-        self.entry(self.rank, ARRIVALS).store(number, Ordering::Release);
-        if self.table.word(ARRIVED).fetch_add(1, Ordering::AcqRel) + 1 == self.size as u32 {
+        self.entry(self.place, ARRIVALS).store(number, Ordering::Release);
+        if self.table.word(ARRIVED).fetch_add(1, Ordering::AcqRel) + 1 == self.ranks.len() as u32 {
             self.table.word(ARRIVED).store(0, Ordering::Relaxed);
             self.table.word(EPOCH).store(number, Ordering::Release);
             let _ = futex::wake(self.table.word(EPOCH), futex::Flags::empty(), i32::MAX as u32);
@@ -233,8 +247,9 @@ impl SharedMemory {
     /// Ranks that have not arrived.
     pub(super) fn missing(&self) -> impl Iterator<Item = usize> {
         let here = self.arrivals.get();
-        (0..self.size)
-            .filter(move |&rank| self.entry(rank, ARRIVALS).load(Ordering::Acquire) != here)
+        let is_missing =
+            move |place: &usize| self.entry(*place, ARRIVALS).load(Ordering::Acquire) != here;
+        self.places().filter(is_missing).map(|place| self.ranks[place])
     }
 
     /// The strings of all ranks in the completed call; empty for a barrier.
@@ -242,18 +257,21 @@ impl SharedMemory {
     /// # Errors
     /// [`CommError::OutOfStep`] if some ranks called a barrier and others an all-gather.
     pub(super) fn gathered(&self) -> Result<Vec<Vec<u8>>, CommError> {
-        let length = |rank| self.table.word(self.slot(rank) + 1).load(Ordering::Relaxed);
+        let length = |place| self.table.word(self.slot(place) + 1).load(Ordering::Relaxed);
         let (waiting, gathering): (Vec<usize>, Vec<usize>) =
-            (0..self.size).partition(|&rank| length(rank) == BARRIER);
+            self.places().partition(|&place| length(place) == BARRIER);
         if gathering.is_empty() {
             return Ok(Vec::new());
         }
         if !waiting.is_empty() {
-            return Err(CommError::OutOfStep { rank: self.rank, gathering, waiting });
+            let rank = self.ranks[self.place];
+            let [gathering, waiting] = [gathering, waiting]
+                .map(|places| places.into_iter().map(|place| self.ranks[place]).collect());
+            return Err(CommError::OutOfStep { rank, gathering, waiting });
         }
-        let strings = (0..self.size).map(|rank| {
-            let first = self.slot(rank) + 2;
-            let length = (length(rank) as usize).min(LONGEST);
+        let strings = self.places().map(|place| {
+            let first = self.slot(place) + 2;
+            let length = (length(place) as usize).min(LONGEST);
             let words = (first..first + length.div_ceil(4))
                 .map(|word| self.table.word(word).load(Ordering::Relaxed).to_ne_bytes());
             let mut string: Vec<u8> = words.flatten().collect();
@@ -263,31 +281,32 @@ impl SharedMemory {
         Ok(strings.collect())
     }
 
-    /// First word of the contribution of `rank` to the call that this rank is in.
-    fn slot(&self, rank: usize) -> usize {
-        let set = self.arrivals.get() as usize % 2;
-        ENTRY * (self.size + 1) + STRING * (set * self.size + rank)
+    /// First word of a rank's contribution to the call that this rank is in.
+    fn slot(&self, place: usize) -> usize {
+        let (set, count) = (self.arrivals.get() as usize % 2, self.ranks.len());
+        ENTRY * (count + 1) + STRING * (set * count + place)
     }
 
     /// Makes a segment of at least `bytes` for this rank.
     fn make_segment(&mut self, bytes: usize) -> std::io::Result<()> {
-        if self.segments[self.rank].as_ref().is_some_and(|segment| segment.mapping.bytes >= bytes) {
+        if self.segments[self.place].as_ref().is_some_and(|segment| segment.mapping.bytes >= bytes)
+        {
             return Ok(());
         }
         // A little more than needed: frames are similar but not equal.
         let bytes = (bytes + bytes / 4).next_multiple_of(1 << 16);
         let file = nameless_file(bytes)?;
         let mapping = Mapping::of(&file, bytes, true)?;
-        let generation = self.entry(self.rank, GENERATION).load(Ordering::Relaxed).wrapping_add(1);
+        let generation = self.entry(self.place, GENERATION).load(Ordering::Relaxed).wrapping_add(1);
         for (word, value) in [
             (PROCESS, std::process::id()),
             (FILE, file.as_raw_fd() as u32),
             (KIB, (bytes / 1024) as u32),
             (GENERATION, generation),
         ] {
-            self.entry(self.rank, word).store(value, Ordering::Relaxed);
+            self.entry(self.place, word).store(value, Ordering::Relaxed);
         }
-        self.segments[self.rank] = Some(Segment { generation, mapping });
+        self.segments[self.place] = Some(Segment { generation, mapping });
         self.own_file = Some(file);
         Ok(())
     }
@@ -296,15 +315,15 @@ impl SharedMemory {
 impl SharedSegments for SharedMemory {
     fn publish(&mut self, bytes: usize, used: usize, fill: &mut dyn FnMut(&mut [u8])) {
         let made = self.make_segment(bytes.max(1));
-        self.entry(self.rank, REFUSED).store(u32::from(made.is_err()), Ordering::Relaxed);
+        self.entry(self.place, REFUSED).store(u32::from(made.is_err()), Ordering::Relaxed);
         self.published.set(self.arrivals.get());
-        self.entry(self.rank, PUBLISHED).store(self.arrivals.get(), Ordering::Relaxed);
-        if self.rank == 0 {
+        self.entry(self.place, PUBLISHED).store(self.arrivals.get(), Ordering::Relaxed);
+        if self.place == 0 {
             // Ranks that took bands of the last frame have reached a barrier since, and no rank
             // takes one before the next.
             self.table.word(NEXT_BAND).store(0, Ordering::Relaxed);
         }
-        if let (Ok(()), Some(segment)) = (made, &self.segments[self.rank]) {
+        if let (Ok(()), Some(segment)) = (made, &self.segments[self.place]) {
             // SAFETY: between the all-gather of a frame and its barrier only its owner uses a
             // segment.
             fill(unsafe { segment.mapping.write(0, used) });
@@ -312,48 +331,49 @@ impl SharedSegments for SharedMemory {
     }
 
     fn attach(&mut self) -> Result<bool, CommError> {
-        let failed = |rank: usize, reason: String| CommError::Transport {
-            rank: self.rank,
-            call: format!("opening the memory of rank {rank}"),
+        let rank = self.ranks[self.place];
+        let failed = |place: usize, reason: String| CommError::Transport {
+            rank,
+            call: format!("opening the memory of rank {}", self.ranks[place]),
             reason,
         };
-        let unpublished = |rank: &usize| {
-            self.entry(*rank, PUBLISHED).load(Ordering::Relaxed) != self.published.get()
+        let unpublished = |place: &usize| {
+            self.entry(*place, PUBLISHED).load(Ordering::Relaxed) != self.published.get()
         };
-        if let Some(rank) = (0..self.size).find(unpublished) {
+        if let Some(place) = self.places().find(unpublished) {
             let reason =
                 "it has laid down nothing for this frame: do all ranks make the same calls?";
-            return Err(failed(rank, reason.to_string()));
+            return Err(failed(place, reason.to_string()));
         }
-        let refused = |rank| self.entry(rank, REFUSED).load(Ordering::Relaxed) != 0;
-        if (0..self.size).any(refused) {
+        let refused = |place| self.entry(place, REFUSED).load(Ordering::Relaxed) != 0;
+        if self.places().any(refused) {
             return Ok(false);
         }
-        for rank in 0..self.size {
-            let generation = self.entry(rank, GENERATION).load(Ordering::Relaxed);
-            if self.segments[rank].as_ref().is_some_and(|segment| segment.generation == generation)
+        for place in self.places() {
+            let generation = self.entry(place, GENERATION).load(Ordering::Relaxed);
+            if self.segments[place].as_ref().is_some_and(|segment| segment.generation == generation)
             {
                 continue;
             }
             let [process, file, kib] =
-                [PROCESS, FILE, KIB].map(|word| self.entry(rank, word).load(Ordering::Relaxed));
+                [PROCESS, FILE, KIB].map(|word| self.entry(place, word).load(Ordering::Relaxed));
             let mapping = file_of(process, file)
                 .and_then(|file| Mapping::of(&file, kib as usize * 1024, true));
             let mapping = match mapping {
                 Ok(mapping) => mapping,
                 // A segment exists as long as its process.
                 Err(_) if !is_alive(process) => {
-                    return Err(CommError::PeerLost { rank: self.rank, peer: rank });
+                    return Err(CommError::PeerLost { rank, peer: self.ranks[place] });
                 }
-                Err(error) => return Err(failed(rank, error.to_string())),
+                Err(error) => return Err(failed(place, error.to_string())),
             };
-            self.segments[rank] = Some(Segment { generation, mapping });
+            self.segments[place] = Some(Segment { generation, mapping });
         }
         Ok(true)
     }
 
     fn segment(&self, rank: usize, bytes: usize) -> &[u8] {
-        let Some(segment) = self.segments[rank].as_ref() else { return &[] };
+        let Some(segment) = self.segment_of(rank) else { return &[] };
         let bytes = bytes.min(segment.mapping.bytes);
         // SAFETY: after the barrier that follows `publish` nobody writes the published pixels until
         // all ranks have entered the next collective call.
@@ -365,7 +385,7 @@ impl SharedSegments for SharedMemory {
     }
 
     fn write_band(&self, rank: usize, from: usize, bytes: usize, write: &mut dyn FnMut(&mut [u8])) {
-        if let Some(segment) = &self.segments[rank] {
+        if let Some(segment) = self.segment_of(rank) {
             // SAFETY: only the rank that has taken a band writes it, and it is read after the next
             // barrier.
             write(unsafe { segment.mapping.write(from, bytes) });
@@ -373,7 +393,7 @@ impl SharedSegments for SharedMemory {
     }
 
     fn band(&self, rank: usize, from: usize, bytes: usize) -> &[u8] {
-        let Some(segment) = &self.segments[rank] else { return &[] };
+        let Some(segment) = self.segment_of(rank) else { return &[] };
         // SAFETY: after the barrier that follows the bands nobody writes them.
         unsafe { segment.mapping.read(from, bytes) }
     }
@@ -385,19 +405,20 @@ mod tests {
 
     /// Three ranks in one process, which opens its own files as other processes would.
     fn three() -> [SharedMemory; 3] {
-        let (first, address) = SharedMemory::make(3).unwrap();
-        [
-            first,
-            SharedMemory::map(1, 3, address).unwrap(),
-            SharedMemory::map(2, 3, address).unwrap(),
-        ]
+        of_ranks([0, 1, 2])
+    }
+
+    fn of_ranks(ranks: [usize; 3]) -> [SharedMemory; 3] {
+        let (first, address) = SharedMemory::make(ranks.to_vec()).unwrap();
+        let other = |rank| SharedMemory::map(rank, ranks.to_vec(), address).unwrap();
+        [first, other(ranks[1]), other(ranks[2])]
     }
 
     #[test]
     fn a_rank_at_a_barrier_is_not_taken_for_one_at_an_all_gather_though_it_runs_ahead() {
         let nodes = three();
         for node in &nodes {
-            node.arrive((node.rank < 2).then_some(&b"drawn"[..]));
+            node.arrive((node.place < 2).then_some(&b"drawn"[..]));
         }
         assert!(nodes.iter().all(SharedMemory::passed));
         // Rank 2 is fast: before the others have read a word, it contributes what they expect.
@@ -416,11 +437,23 @@ mod tests {
     }
 
     #[test]
+    fn ranks_of_one_machine_among_several_keep_their_numbers() {
+        let nodes = of_ranks([2, 5, 7]);
+        nodes[0].arrive(Some(b"drawn"));
+        assert_eq!(nodes[0].missing().collect::<Vec<_>>(), [5, 7]);
+        nodes[1].arrive(Some(b"drawn"));
+        nodes[2].arrive(None);
+        let error = CommError::OutOfStep { rank: 5, gathering: vec![2, 5], waiting: vec![7] };
+        assert_eq!(nodes[1].gathered(), Err(error));
+        assert!(nodes[0].segment(5, 8).is_empty() && nodes[0].segment(6, 8).is_empty());
+    }
+
+    #[test]
     fn gathered_messages_stay_readable_during_the_next_collective() {
         let nodes = three();
         for number in 0..5_u8 {
             for node in &nodes {
-                node.arrive(Some(&[number, node.rank as u8]));
+                node.arrive(Some(&[number, node.place as u8]));
             }
             let expected = (0..3).map(|rank| vec![number, rank]).collect::<Vec<_>>();
             assert_eq!(nodes[1].gathered().as_ref(), Ok(&expected));
