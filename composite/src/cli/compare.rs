@@ -33,8 +33,7 @@ pub(super) struct CompareArgs {
     /// The frames: discs, dense, frag, several of them or all
     #[arg(long, default_value = "all", value_name = "SCENE", value_delimiter = ',', value_parser = workload_named)]
     scene: Vec<Workloads>,
-    /// What is composited: RGBA8 with depth (depth), premultiplied RGBA f32 in order (blend), or
-    /// both as depth,blend
+    /// What is composited; several such as depth,blend
     #[arg(long, default_value = "depth", value_delimiter = ',')]
     pixels: Vec<Pixels>,
     /// Our strategy; auto selects the fastest by a model of the network, which is measured first

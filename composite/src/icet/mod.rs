@@ -54,6 +54,14 @@ pub enum IcetError {
         /// Values given.
         found: usize,
     },
+    /// A frame of another kind than the mode composites.
+    #[error("a frame of {found} where IceT was set up for {mode:?}")]
+    FrameFormat {
+        /// The mode.
+        mode: IcetMode,
+        /// What was given.
+        found: &'static str,
+    },
     /// IceT reported an error.
     #[error("IceT reports error {code:#010x} (see IceT.h)")]
     Reported {
@@ -105,6 +113,8 @@ impl IcetStrategy {
 pub enum IcetMode {
     /// RGBA8 and depth, nearest wins.
     Depth,
+    /// RGBA f32 and depth, nearest wins.
+    DepthF32,
     /// Premultiplied RGBA8, in order.
     BlendU8,
     /// Premultiplied RGBA f32, in order.
@@ -116,10 +126,23 @@ pub enum IcetMode {
 pub enum IcetFrame<'a> {
     /// For [`IcetMode::Depth`].
     Depth(&'a [[u8; 4]], &'a [f32]),
+    /// For [`IcetMode::DepthF32`].
+    DepthF32(&'a [[f32; 4]], &'a [f32]),
     /// For [`IcetMode::BlendU8`].
     BlendU8(&'a [[u8; 4]]),
     /// For [`IcetMode::BlendF32`].
     BlendF32(&'a [[f32; 4]]),
+}
+
+impl IcetFrame<'_> {
+    fn name(&self) -> &'static str {
+        match self {
+            IcetFrame::Depth(..) => "RGBA8 and depth",
+            IcetFrame::DepthF32(..) => "RGBA f32 and depth",
+            IcetFrame::BlendU8(_) => "premultiplied RGBA8",
+            IcetFrame::BlendF32(_) => "premultiplied RGBA f32",
+        }
+    }
 }
 
 /// The collected image, in IceT's memory until its next frame.
@@ -233,6 +256,7 @@ impl Icet {
         // Constants of IceT.h.
         let (composite_mode, color, depth) = match mode {
             IcetMode::Depth => (0x0301, 0xC001, 0xD001),
+            IcetMode::DepthF32 => (0x0301, 0xC002, 0xD001),
             IcetMode::BlendU8 => (0x0302, 0xC001, 0xD000),
             IcetMode::BlendF32 => (0x0302, 0xC002, 0xD000),
         };
@@ -249,7 +273,7 @@ impl Icet {
             (f.strategy)(0x6004);
             // No bounding box: the viewport of each frame says more.
             (f.bounding_vertices)(0, 0x800F, 0, 0, std::ptr::null());
-            if mode != IcetMode::Depth {
+            if matches!(mode, IcetMode::BlendU8 | IcetMode::BlendF32) {
                 (f.enable)(0x0142);
             }
         }
@@ -284,15 +308,30 @@ impl Icet {
     /// the image.
     ///
     /// # Errors
-    /// [`IcetError::FrameSize`], [`IcetError::Reported`].
+    /// [`IcetError::FrameSize`], [`IcetError::FrameFormat`], [`IcetError::Reported`].
     pub fn composite(
         &mut self,
         comm: &mut dyn Communicator,
         frame: IcetFrame<'_>,
         bounds: Rect,
     ) -> Result<Option<IcetImage<'_>>, IcetError> {
+        // IceT reads as many bytes as its mode has.
+        let mode = match frame {
+            IcetFrame::Depth(..) => IcetMode::Depth,
+            IcetFrame::DepthF32(..) => IcetMode::DepthF32,
+            IcetFrame::BlendU8(_) => IcetMode::BlendU8,
+            IcetFrame::BlendF32(_) => IcetMode::BlendF32,
+        };
+        if mode != self.mode {
+            return Err(IcetError::FrameFormat { mode: self.mode, found: frame.name() });
+        }
         let (colors, depths): (*const c_void, *const c_void) = match frame {
             IcetFrame::Depth(colors, depths) => {
+                self.fits(colors.len())?;
+                self.fits(depths.len())?;
+                (colors.as_ptr().cast(), depths.as_ptr().cast())
+            }
+            IcetFrame::DepthF32(colors, depths) => {
                 self.fits(colors.len())?;
                 self.fits(depths.len())?;
                 (colors.as_ptr().cast(), depths.as_ptr().cast())
@@ -334,7 +373,7 @@ impl Icet {
         // IceT keeps it until its next frame, which needs `&mut self`.
         Ok(Some(unsafe {
             match self.mode {
-                IcetMode::BlendF32 => {
+                IcetMode::BlendF32 | IcetMode::DepthF32 => {
                     let first = (self.library.functions.image_colors_f32)(image);
                     IcetImage::RgbaF32(std::slice::from_raw_parts(first, self.pixels))
                 }

@@ -174,7 +174,7 @@ fn compare(more: &[&str], variables: &[(&str, &Path)]) {
 fn icet_between_threads_gives_the_same_pixels() {
     let Some(icet) = peer("RTSV_ICET") else { return };
     for ranks in ["1", "3", "8"] {
-        for pixels in ["depth", "blend"] {
+        for pixels in ["depth", "depth-f16", "depth-f32", "blend"] {
             compare(&["--threads", "-n", ranks, "--pixels", pixels], &[("RTSV_ICET", &icet)]);
         }
     }
@@ -183,7 +183,7 @@ fn icet_between_threads_gives_the_same_pixels() {
 #[test]
 fn icet_over_its_own_mpi_layer_gives_the_same_pixels() {
     let (Some(icet), Some(mpirun)) = (peer("RTSV_ICET"), peer("RTSV_MPIRUN")) else { return };
-    for pixels in ["depth", "blend"] {
+    for pixels in ["depth", "depth-f16", "depth-f32", "blend"] {
         let variables: [(&str, &Path); 2] = [("RTSV_ICET", &icet), ("COMPOSITE_MPIRUN", &mpirun)];
         compare(&["--mpi", "-n", "4", "--pixels", pixels], &variables);
     }

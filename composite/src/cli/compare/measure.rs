@@ -11,6 +11,7 @@ use crate::strategies::Strategy;
 use crate::workload::{SyntheticFrame, Workload};
 use anyhow::Context as _;
 use datasets::cli::UsageError;
+use half::f16;
 use rt_core::math::median_high;
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -41,9 +42,14 @@ pub(super) struct Bench<'a> {
     setting: Setting,
     icet: Icet,
     depth: Compositor<DepthPixel<[u8; 4]>>,
+    depth_f16: Compositor<DepthPixel<[f16; 4]>>,
+    depth_f32: Compositor<DepthPixel<[f32; 4]>>,
     blend: Compositor<PremultipliedPixel<[f32; 4]>>,
     drawn: SyntheticFrame,
-    glass: Vec<[f32; 4]>,
+    /// The colours in half precision, where they are composited so.
+    halves: Vec<[f16; 4]>,
+    /// The colours in single precision: premultiplied where they are blended.
+    floats: Vec<[f32; 4]>,
 }
 
 /// One rank's members of shared-memory groups, for ranks that are threads.
@@ -78,6 +84,7 @@ impl<'a> Bench<'a> {
         let Setting { size_px: size, strategy, in_memory, simd, timeout, .. } = setting;
         let mode = match setting.pixels {
             Pixels::Depth => IcetMode::Depth,
+            Pixels::DepthF16 | Pixels::DepthF32 => IcetMode::DepthF32,
             Pixels::Blend => IcetMode::BlendF32,
         };
         let icet = match comm {
@@ -101,26 +108,46 @@ impl<'a> Bench<'a> {
             setting,
             icet: icet.map_err(|error| UsageError(error.to_string()))?,
             depth: Compositor::new(options.clone()),
+            depth_f16: Compositor::new(options.clone()),
+            depth_f32: Compositor::new(options.clone()),
             blend: Compositor::new(options),
             drawn: SyntheticFrame::new(size, size),
-            glass: Vec::new(),
+            halves: Vec::new(),
+            floats: Vec::new(),
         })
     }
 
-    fn shared(&self) -> anyhow::Result<Shared> {
+    /// An image that the threads of this process share, in the formats that they have groups for.
+    fn shared(&self) -> anyhow::Result<Option<Shared>> {
         let SyntheticFrame { width_px, height_px, colors, depths, .. } = &self.drawn;
         Ok(match self.setting.pixels {
             Pixels::Depth => {
                 let image =
                     Image::from_planes(*width_px, *height_px, colors.clone(), depths.clone())?;
-                Shared::Depth(Arc::new(image))
+                Some(Shared::Depth(Arc::new(image)))
             }
             Pixels::Blend => {
                 let image =
-                    Image::from_planes(*width_px, *height_px, self.glass.clone(), Vec::new())?;
-                Shared::Blend(Arc::new(image))
+                    Image::from_planes(*width_px, *height_px, self.floats.clone(), Vec::new())?;
+                Some(Shared::Blend(Arc::new(image)))
             }
+            Pixels::DepthF16 | Pixels::DepthF32 => None,
         })
+    }
+
+    /// The frame's colours in the format that is composited.
+    fn convert(&mut self) {
+        match self.setting.pixels {
+            Pixels::Depth => {}
+            Pixels::Blend => self.drawn.premultiplied(&mut self.floats),
+            Pixels::DepthF16 | Pixels::DepthF32 => {
+                let colors = self.drawn.colors.iter();
+                self.floats.clear();
+                self.floats.extend(colors.map(|color| color.map(|c| f32::from(c) / 255.0)));
+                self.halves.clear();
+                self.halves.extend(self.floats.iter().map(|color| color.map(f16::from_f32)));
+            }
+        }
     }
 
     /// Composites the current frame with IceT's strategy of this number, and calls `look` with the
@@ -139,7 +166,10 @@ impl<'a> Bench<'a> {
         let begin = self.comm.comm().now();
         let frame = match pixels {
             Pixels::Depth => IcetFrame::Depth(&self.drawn.colors, &self.drawn.depths),
-            Pixels::Blend => IcetFrame::BlendF32(&self.glass),
+            Pixels::DepthF16 | Pixels::DepthF32 => {
+                IcetFrame::DepthF32(&self.floats, &self.drawn.depths)
+            }
+            Pixels::Blend => IcetFrame::BlendF32(&self.floats),
         };
         let theirs = self.icet.composite(self.comm.comm(), frame, self.drawn.bounds);
         let theirs = theirs.with_context(|| format!("IceT's {}", chosen.name()))?;
@@ -148,6 +178,39 @@ impl<'a> Bench<'a> {
             times_ms[strategy].push(1e3 * (self.comm.comm().now() - begin));
         }
         Ok(theirs.map(look))
+    }
+
+    /// Composites the current frame; `order` is for blending.
+    fn run_ours(
+        &mut self,
+        order: Vec<usize>,
+    ) -> anyhow::Result<(Option<CompositeImage>, crate::Report)> {
+        let comm = self.comm.comm();
+        let SyntheticFrame { width_px: w, height_px: h, colors, depths, bounds, .. } = &self.drawn;
+        Ok(match self.setting.pixels {
+            Pixels::Depth => {
+                let frame = Frame::with_depth(*w, *h, colors, depths)?.with_bounds(*bounds)?;
+                let done = self.depth.composite(comm, &frame)?;
+                (done.image.map(CompositeImage::Depth), done.report)
+            }
+            Pixels::DepthF16 => {
+                let frame = Frame::with_depth(*w, *h, &self.halves, depths)?;
+                let done = self.depth_f16.composite(comm, &frame.with_bounds(*bounds)?)?;
+                (done.image.map(CompositeImage::DepthF16), done.report)
+            }
+            Pixels::DepthF32 => {
+                let frame = Frame::with_depth(*w, *h, &self.floats, depths)?;
+                let done = self.depth_f32.composite(comm, &frame.with_bounds(*bounds)?)?;
+                (done.image.map(CompositeImage::DepthF32), done.report)
+            }
+            Pixels::Blend => {
+                // The order changes from frame to frame; the buffers remain.
+                self.blend.set_order(Some(order));
+                let frame = Frame::premultiplied(*w, *h, &self.floats)?.with_bounds(*bounds)?;
+                let done = self.blend.composite(comm, &frame)?;
+                (done.image.map(CompositeImage::Blend), done.report)
+            }
+        })
     }
 
     /// Measures frames of one workload.
@@ -165,14 +228,14 @@ impl<'a> Bench<'a> {
         for moment in 0..WARM_UP + frames {
             scene.draw(moment, rank, ranks, &mut self.drawn);
             let order = scene.front_to_back(moment, ranks);
+            self.convert();
             if pixels == Pixels::Blend {
-                self.drawn.premultiplied(&mut self.glass);
                 self.icet.set_order(&order);
             }
             let timed = moment >= WARM_UP;
 
             // Renderers of one process can draw into shared images.
-            let shared = members.is_some().then(|| self.shared()).transpose()?;
+            let shared = if members.is_some() { self.shared()? } else { None };
             let turns = rotated_order(1 + IcetStrategy::ALL.len(), moment);
             let ours_at = turns.iter().position(|turn| *turn == 0).unwrap_or(0);
             let mut copies = Vec::new();
@@ -199,32 +262,7 @@ impl<'a> Bench<'a> {
                         members.blend.composite(comm, image, bounds, self.blend.options())?;
                     (done.image.map(CompositeImage::Blend), done.report)
                 }
-                _ if pixels == Pixels::Depth => {
-                    let drawn = &self.drawn;
-                    let frame = Frame::with_depth(
-                        drawn.width_px,
-                        drawn.height_px,
-                        &drawn.colors,
-                        &drawn.depths,
-                    )?;
-                    let done = self
-                        .depth
-                        .composite(self.comm.comm(), &frame.with_bounds(drawn.bounds)?)?;
-                    (done.image.map(CompositeImage::Depth), done.report)
-                }
-                _ => {
-                    // The order changes from frame to frame; the buffers remain.
-                    self.blend.set_order(Some(order));
-                    let frame = Frame::premultiplied(
-                        self.drawn.width_px,
-                        self.drawn.height_px,
-                        &self.glass,
-                    )?;
-                    let done = self
-                        .blend
-                        .composite(self.comm.comm(), &frame.with_bounds(self.drawn.bounds)?)?;
-                    (done.image.map(CompositeImage::Blend), done.report)
-                }
+                _ => self.run_ours(order)?,
             };
             self.comm.comm().barrier(timeout)?;
             if timed {
@@ -249,6 +287,8 @@ impl<'a> Bench<'a> {
                 (Some(CompositeImage::Depth(image)), Some(members)) => members.depth.recycle(image),
                 (Some(CompositeImage::Blend(image)), Some(members)) => members.blend.recycle(image),
                 (Some(CompositeImage::Depth(image)), None) => self.depth.recycle(image),
+                (Some(CompositeImage::DepthF16(image)), _) => self.depth_f16.recycle(image),
+                (Some(CompositeImage::DepthF32(image)), _) => self.depth_f32.recycle(image),
                 (Some(CompositeImage::Blend(image)), None) => self.blend.recycle(image),
                 (None, _) => {}
             }
@@ -352,12 +392,21 @@ enum Shared {
 
 enum CompositeImage {
     Depth(Image<DepthPixel<[u8; 4]>>),
+    DepthF16(Image<DepthPixel<[f16; 4]>>),
+    DepthF32(Image<DepthPixel<[f32; 4]>>),
     Blend(Image<PremultipliedPixel<[f32; 4]>>),
 }
 
 fn count_differing(ours: &CompositeImage, theirs: IcetImage<'_>) -> u64 {
     let count = match (ours, theirs) {
         (CompositeImage::Depth(ours), IcetImage::Rgba8(theirs)) => {
+            ours.colors().iter().zip(theirs).filter(|(a, b)| a != b).count()
+        }
+        (CompositeImage::DepthF16(ours), IcetImage::RgbaF32(theirs)) => {
+            let differ = |(a, b): &(&[f16; 4], &[f32; 4])| **a != b.map(f16::from_f32);
+            ours.colors().iter().zip(theirs).filter(differ).count()
+        }
+        (CompositeImage::DepthF32(ours), IcetImage::RgbaF32(theirs)) => {
             ours.colors().iter().zip(theirs).filter(|(a, b)| a != b).count()
         }
         (CompositeImage::Blend(ours), IcetImage::RgbaF32(theirs)) => {

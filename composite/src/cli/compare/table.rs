@@ -4,9 +4,15 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[serde(rename_all = "kebab-case")]
 pub(super) enum Pixels {
+    /// RGBA8 with depth
     Depth,
+    /// RGBA in half precision with depth; IceT has none, so it composites f32
+    DepthF16,
+    /// RGBA f32 with depth
+    DepthF32,
+    /// Premultiplied RGBA f32, in order
     Blend,
 }
 
@@ -14,6 +20,8 @@ impl Pixels {
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::Depth => "depth",
+            Self::DepthF16 => "depth-f16",
+            Self::DepthF32 => "depth-f32",
             Self::Blend => "blend",
         }
     }
@@ -51,7 +59,8 @@ pub(super) struct Row {
     pub(super) pixels_differ: u64,
     pub(super) ours_min_ms: f64,
     pub(super) rival_min_ms: f64,
-    /// The strategy that was used for the last frame; `SharedMemory` where no messages were sent.
+    /// The strategy that was used for the last frame; `SharedMemory` where no messages were sent,
+    /// `SharedMemory on 4, DirectSend` where four machines merged first.
     pub(super) ours_strategy: String,
     pub(super) simd: String,
     pub(super) ours_mb: f64,
@@ -70,7 +79,7 @@ impl fmt::Display for Comparison {
         }
         write!(
             f,
-            "{:<6} {:>5} {:>6} {:<6} {:<7} {:>9} {:>10} {:<9} {:>6} {:>14}",
+            "{:<6} {:>5} {:>6} {:<9} {:<7} {:>9} {:>10} {:<9} {:>6} {:>14}",
             "scene",
             "ranks",
             "size",
@@ -85,7 +94,7 @@ impl fmt::Display for Comparison {
         for row in &self.rows {
             write!(
                 f,
-                "\n{:<6} {:>5} {:>6} {:<6} {:<7} {:>9.3} {:>10.3} {:<9} {:>6.2} {:>14}",
+                "\n{:<6} {:>5} {:>6} {:<9} {:<7} {:>9.3} {:>10.3} {:<9} {:>6.2} {:>14}",
                 row.scene,
                 row.ranks,
                 row.size_px,
