@@ -6,7 +6,7 @@ use crate::error::CompositeError;
 use crate::frame::{Frame, Image, Piece};
 use crate::frame_exchange::FrameExchange;
 use crate::in_memory::{self, Merging};
-use crate::machine_groups::{MachineGroup, machine_groups};
+use crate::machine_groups::{self, MachineGroup};
 use crate::merge::Scratch;
 use crate::network_costs::NetworkCosts;
 use crate::pixel::{Composite, PixelFormat};
@@ -52,7 +52,7 @@ pub struct Options {
     /// rank. With several machines each merges what its ranks drew, and one rank of each sends
     /// that on; for this, ranks of a machine must be neighbours in the order, and for premultiplied
     /// colours all machines must have equally many ranks and both numbers be powers of two.
-    /// Otherwise, and where there is no such memory, all ranks send messages.
+    /// [`Strategy::Automatic`] does so only where its model finds it faster. Otherwise, and where there is no such memory, all ranks send messages.
     pub in_memory: bool,
     /// The instruction set; `None` is the best this machine has. Changes the time, never the image.
     pub simd: Option<SimdLevel>,
@@ -182,7 +182,7 @@ impl<P: Composite> Compositor<P> {
         let size_px = (frame.width_px(), frame.height_px());
         let may_share = options.in_memory
             && matches!(options.strategy, Strategy::DirectSend | Strategy::Automatic);
-        let groups = if may_share { machine_groups::<P>(comm, &order) } else { None };
+        let groups = if may_share { machine_groups::by_machine::<P>(comm, &order) } else { None };
         let is_one_group = groups.as_ref().is_some_and(|groups| groups.len() == 1);
         if options.strategy == Strategy::Automatic && self.network.is_none() && !is_one_group {
             self.network = Some(NetworkCosts::measure(comm, options.timeout)?);
@@ -212,20 +212,43 @@ impl<P: Composite> Compositor<P> {
         // Ranks of one machine merge in shared memory.
         let groups =
             groups.filter(|groups| in_memory::is_possible::<P>(&mut exchange, size_px, groups));
+        let groups = groups.filter(|groups| match (options.strategy, &self.network) {
+            (Strategy::Automatic, Some(network)) if groups.len() > 1 => {
+                machine_groups::pays::<P>(groups, network, &exchange.drawn, true)
+            }
+            _ => true,
+        });
         let mut view = frame.view(drawn);
         let mut machine_image = None;
         if let Some(groups) = &groups {
             let among_others = groups.len() > 1;
-            let own = groups.iter().position(|group| group.members.contains(&order.own_index));
-            let group = &groups[own.unwrap_or(0)];
-            let part = group.drawn(&exchange.drawn);
-            let (rows, depths, spare) = match among_others {
-                true => (part.y0..part.y1, true, &mut self.node_image),
-                false => (0..size_px.1, options.depth, &mut self.spare),
+            let of_rank = |group: &&MachineGroup| group.members.contains(&order.own_index);
+            let group = groups.iter().find(of_rank).unwrap_or(&groups[0]);
+            let own = match among_others {
+                true => Merging::part(view, size_px, group, &exchange.drawn),
+                false => Merging::whole(view, size_px, group, options.depth),
             };
-            let merging = Merging { view, size_px, group, rows, depths, among_others };
-            let spare = spare.take();
-            if let Some(image) = in_memory::run(&mut exchange, &merging, spare, kernels)? {
+            // A machine without memory would be known to its own ranks only. So those of several
+            // merge only when all have it already; until then they send messages.
+            let has_memory = |group: &MachineGroup| {
+                let merging = Merging::part(view, size_px, group, &exchange.drawn);
+                group.members.clone().all(|index| {
+                    let bytes = merging.segment_bytes(index, &exchange.drawn[index]);
+                    bytes <= exchange.shared_bytes[index]
+                })
+            };
+            let has_memory = !among_others || groups.iter().all(has_memory);
+            let merged = if has_memory {
+                let spare = if among_others { &mut self.node_image } else { &mut self.spare };
+                in_memory::run(&mut exchange, &own, spare.take(), kernels)?
+            } else {
+                let bytes = own.segment_bytes(order.own_index, &drawn);
+                if let Some(memory) = exchange.comm.shared_segments() {
+                    memory.reserve(bytes);
+                }
+                None
+            };
+            if let Some(image) = merged {
                 exchange.report.in_memory = true;
                 exchange.report.machines = groups.len();
                 let leads = order.own_index == group.leader;
@@ -238,9 +261,11 @@ impl<P: Composite> Compositor<P> {
                     return Ok(CompositeOutput { image, piece: None, report });
                 }
                 // The leaders composite what their machines have merged.
-                let drawn = groups.iter().map(|group| group.drawn(&exchange.drawn)).collect();
+                let parts: Vec<Rect> =
+                    groups.iter().map(|group| group.drawn(&exchange.drawn)).collect();
+                let part = group.drawn(&exchange.drawn);
                 let leaders: Vec<usize> = groups.iter().map(|group| group.leader).collect();
-                exchange.restrict_to(&leaders, drawn);
+                exchange.restrict_to(&leaders, parts);
                 exchange.counts_nan = false;
                 machine_image = image;
                 if let Some(image) = &machine_image {

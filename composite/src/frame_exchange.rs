@@ -25,8 +25,9 @@ pub(crate) struct Message {
     depths: bool,
 }
 
-/// Longest contribution to [`FrameExchange::handshake`]: fingerprint, rectangle, depth range.
-const HANDSHAKE_BYTES: usize = 8 + 16 + 8;
+/// Longest contribution to [`FrameExchange::handshake`]: fingerprint, rectangle, depth range, and
+/// KiB of the shared segment.
+const HANDSHAKE_BYTES: usize = 8 + 16 + 8 + 4;
 
 /// See [`FrameExchange::begin_span`].
 pub(crate) struct Span {
@@ -44,6 +45,8 @@ pub(crate) struct FrameExchange<'a> {
     timeout: Duration,
     /// The rectangle that each rank drew in, by order index.
     pub(crate) drawn: Vec<Rect>,
+    /// Bytes of memory that each rank shares with those of its machine, by order index; whole KiB.
+    pub(crate) shared_bytes: Vec<usize>,
     pub(crate) report: Report,
     /// Whether NaN depths are counted while messages are encoded. Otherwise they were counted when
     /// the frame was scanned for its bounds.
@@ -67,6 +70,7 @@ impl<'a> FrameExchange<'a> {
             codec,
             timeout,
             drawn: Vec::new(),
+            shared_bytes: Vec::new(),
             report: Report::default(),
             counts_nan: false,
             posted: Vec::new(),
@@ -114,9 +118,13 @@ impl<'a> FrameExchange<'a> {
         handshake
             .extend_from_slice(bytemuck::cast_slice(&[drawn.x0, drawn.y0, drawn.x1, drawn.y1]));
         handshake.extend_from_slice(bytemuck::cast_slice(&depths));
+        let shared = self.comm.shared_segments().map_or(0, |memory| memory.reserved());
+        handshake
+            .extend_from_slice(&u32::try_from(shared / 1024).unwrap_or(u32::MAX).to_le_bytes());
         let answers = self.comm.all_gather(&handshake, HANDSHAKE_BYTES, self.timeout)?;
         let mut intervals = Vec::with_capacity(self.num_ranks());
         self.drawn.clear();
+        self.shared_bytes.clear();
         for order_index in 0..self.num_ranks() {
             let answer = &answers[self.order[order_index]];
             let Ok(answer) = <&[u8; HANDSHAKE_BYTES]>::try_from(answer.as_slice()) else {
@@ -137,6 +145,8 @@ impl<'a> FrameExchange<'a> {
             }
             self.drawn.push(if found.is_empty() { Rect::EMPTY } else { found });
             intervals.push(bytemuck::pod_read_unaligned(&answer[24..32]));
+            let kib = bytemuck::pod_read_unaligned::<u32>(&answer[32..36]);
+            self.shared_bytes.push(kib as usize * 1024);
         }
         self.report.exchange_secs += self.now() - begin;
         Ok(intervals)

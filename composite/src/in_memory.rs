@@ -110,13 +110,55 @@ pub(crate) struct Merging<'a, P: Composite> {
     pub(crate) rows: Range<u32>,
     /// Whether the merged image has depths.
     pub(crate) depths: bool,
-    /// Whether other machines merge too.
-    pub(crate) among_others: bool,
+}
+
+impl<'a, P: Composite> Merging<'a, P> {
+    /// The whole image, which all ranks of the group make.
+    pub(crate) fn whole(
+        view: View<'a, P>,
+        size_px: (u32, u32),
+        group: &'a MachineGroup,
+        depths: bool,
+    ) -> Self {
+        Self { view, size_px, group, rows: 0..size_px.1, depths }
+    }
+
+    /// The rows in which ranks of the group drew. `drawn` has the rectangles of all ranks.
+    pub(crate) fn part(
+        view: View<'a, P>,
+        size_px: (u32, u32),
+        group: &'a MachineGroup,
+        drawn: &[Rect],
+    ) -> Self {
+        let part = group.drawn(drawn);
+        Self { view, size_px, group, rows: part.y0..part.y1, depths: true }
+    }
+
+    /// The bands of the image, in the segment of the leader who drew in `drawn`.
+    fn bands(&self, drawn: &Rect) -> Bands {
+        let depths = self.depths && P::HAS_DEPTH;
+        let width = self.size_px.0 as usize;
+        Bands {
+            width,
+            rows: self.rows.start as usize..self.rows.end as usize,
+            first: Planes::of::<P>(drawn).depths.end.next_multiple_of(ALIGNMENT),
+            depths,
+            row_bytes: width * (size_of::<P::Color>() + if depths { 4 } else { 0 }),
+        }
+    }
+
+    /// Bytes of the segment of a rank who drew in `drawn`.
+    pub(crate) fn segment_bytes(&self, order_index: usize, drawn: &Rect) -> usize {
+        match order_index == self.group.leader {
+            true => self.bands(drawn).end(),
+            false => Planes::of::<P>(drawn).depths.end,
+        }
+    }
 }
 
 /// The image at the leader of the group, of which the given rows are merged; returns after a
-/// barrier of the machine. The outer `None` is returned on all ranks if there was not enough memory
-/// on a machine.
+/// barrier of the machine. The outer `None` is returned on all ranks of the machine if there was not
+/// enough memory.
 pub(crate) fn run<P: Composite>(
     exchange: &mut FrameExchange<'_>,
     merging: &Merging<'_, P>,
@@ -124,18 +166,15 @@ pub(crate) fn run<P: Composite>(
     kernels: Kernels,
 ) -> Result<Option<Option<Image<P>>>, CompositeError> {
     let Merging { view, size_px: (width_px, height_px), group, .. } = merging;
-    let (width, root) = (*width_px as usize, group.leader);
-    let depths = merging.depths && P::HAS_DEPTH;
-    let row_bytes = width * (size_of::<P::Color>() + if depths { 4 } else { 0 });
-    let of_root = Planes::of::<P>(&exchange.drawn[root]).depths.end.next_multiple_of(ALIGNMENT);
-    let rows = merging.rows.start as usize..merging.rows.end as usize;
-    let bands = Bands { width, rows, first: of_root, depths, row_bytes };
+    let root = group.leader;
+    let bands = merging.bands(&exchange.drawn[root]);
+    let (width, depths) = (bands.width, bands.depths);
 
     // Publish what this rank drew.
     let begin = exchange.comm.working_secs();
     exchange.count_nan(view, view.bounds);
     let own = Planes::of::<P>(&view.bounds);
-    let bytes = if exchange.order_index == root { bands.end() } else { own.depths.end };
+    let bytes = merging.segment_bytes(exchange.order_index, &view.bounds);
     if let Some(memory) = exchange.comm.shared_segments() {
         memory.publish(bytes, own.depths.end, &mut |segment| copy_rows(view, &own, segment));
     }
@@ -143,19 +182,12 @@ pub(crate) fn run<P: Composite>(
     let span = exchange.begin_span();
     exchange.machine_barrier()?;
     let Some(memory) = exchange.comm.shared_segments() else { return Ok(None) };
-    let mut has_memory = match memory.attach() {
-        Ok(has_memory) => has_memory,
+    match memory.attach() {
+        Ok(true) => {}
+        Ok(false) => return Ok(None),
         Err(error) => return Err(exchange.comm.root_cause(error).into()),
-    };
-    if merging.among_others {
-        // A machine without enough memory is known to its own ranks only.
-        let all = exchange.all_gather_number(u64::from(has_memory))?;
-        has_memory = all.iter().all(|has| *has == 1);
     }
     exchange.end_span(span, |report| &mut report.exchange_secs);
-    if !has_memory {
-        return Ok(None);
-    }
 
     // Merge bands, as long as there are any.
     let begin = exchange.comm.working_secs();

@@ -7,7 +7,8 @@
 //! processes.)
 use crate::comm::Communicator;
 use crate::compositor::CompositingOrder;
-use crate::pixel::PixelFormat;
+use crate::network_costs::{LOCAL_BYTE_SECS, LOCAL_MESSAGE_SECS, NetworkCosts};
+use crate::pixel::{Composite, PixelFormat};
 use crate::rect::Rect;
 use std::ops::Range;
 
@@ -29,7 +30,7 @@ impl MachineGroup {
 
 /// The machines in the order of compositing, if their ranks share memory and merging them first
 /// does not change a bit of the image. The same on all ranks.
-pub(crate) fn machine_groups<P: PixelFormat>(
+pub(crate) fn by_machine<P: PixelFormat>(
     comm: &dyn Communicator,
     order: &CompositingOrder,
 ) -> Option<Vec<MachineGroup>> {
@@ -37,6 +38,35 @@ pub(crate) fn machine_groups<P: PixelFormat>(
     let machines = comm.machines_with_shared_memory()?;
     let groups = groups_of(&order.ranks, machines, root)?;
     (P::HAS_DEPTH || keeps_grouping(&groups)).then_some(groups)
+}
+
+/// Whether a model finds it faster that machines merge first. `drawn` has the rectangles of all
+/// ranks. With `root`, the image is collected.
+pub(crate) fn pays<P: Composite>(
+    groups: &[MachineGroup],
+    network: &NetworkCosts,
+    drawn: &[Rect],
+    root: bool,
+) -> bool {
+    let secs = |network: &NetworkCosts, drawn: &[Rect], root| {
+        network.estimate_secs::<P>(network.choose::<P>(drawn, root), drawn, root)
+    };
+    // The ranks of a machine share its wire, except for the image, which one rank collects.
+    let ranks = groups.iter().map(|group| group.members.len()).max().unwrap_or(1);
+    let shared = NetworkCosts { byte_secs: network.byte_secs * ranks as f64, ..*network };
+    // Each rank copies what it drew, all merge it, and the leader copies the result. Each byte is
+    // read and written, between two barriers.
+    let merging = |group: &MachineGroup| {
+        let bytes = |rect: &Rect| (rect.pixels() * P::BYTES) as f64;
+        let of_ranks = drawn[group.members.clone()].iter().map(bytes);
+        let (most, sum) = of_ranks.fold((0.0_f64, 0.0), |(m, s), bytes| (m.max(bytes), s + bytes));
+        let copied = most + sum / group.members.len() as f64 + bytes(&group.drawn(drawn));
+        2.0 * (LOCAL_BYTE_SECS * copied + LOCAL_MESSAGE_SECS)
+    };
+    let merged: Vec<Rect> = groups.iter().map(|group| group.drawn(drawn)).collect();
+    let merging = groups.iter().map(merging).fold(0.0, f64::max);
+    let sent = f64::max(secs(network, drawn, root), secs(&shared, drawn, false));
+    merging + secs(network, &merged, root) < sent
 }
 
 /// `None` where ranks of a machine are not neighbours in the order: at equal depths the last rank
@@ -95,6 +125,26 @@ mod tests {
         assert_eq!(groups_of(&[0, 1, 2, 3], &[0, 1, 0, 1], 0), None);
         assert_eq!(groups_of(&[0, 1, 2], &[0, 1, 2], 0), None);
         assert_eq!(groups_of(&[0, 1], &[0], 0), None);
+    }
+
+    #[test]
+    fn the_model_merges_many_dense_ranks_of_a_machine_first_but_not_a_few_far_apart() {
+        use crate::pixel::DepthPixel;
+        let pays = |machines: usize, each: usize, rect: fn(usize) -> Rect| {
+            let groups: Vec<_> =
+                (0..machines).map(|m| group(m * each..(m + 1) * each, m * each)).collect();
+            let drawn: Vec<_> = (0..machines * each).map(rect).collect();
+            super::pays::<DepthPixel<[u8; 4]>>(&groups, &NetworkCosts::QDR, &drawn, true)
+        };
+        assert!(pays(8, 32, |_| Rect::of_size(1024, 1024)));
+        // Each rank has a strip of its own: there is nothing to merge.
+        let strip = |rank: usize| Rect {
+            x0: 0,
+            y0: 128 * rank as u32,
+            x1: 1024,
+            y1: 128 * (rank as u32 + 1),
+        };
+        assert!(!pays(4, 2, strip));
     }
 
     #[test]

@@ -29,11 +29,11 @@ const ROUNDS: usize = 8;
 const LONG_BYTES: usize = 1 << 18;
 /// Time to read or write a byte of a message on one core, about; measured on a server of 2023. Only
 /// its ratio to the network matters.
-const LOCAL_BYTE_SECS: f64 = 1.5e-10;
+pub(crate) const LOCAL_BYTE_SECS: f64 = 1.5e-10;
 /// Time that a rank spends on each message besides its pixels (a buffer, a header, masks, checking
 /// whether it has been sent), about. From 16 to 128 simulated ranks, dense frames by direct send
 /// take 15 µs more for each rank, which is one message more to send, to receive and to collect.
-const LOCAL_MESSAGE_SECS: f64 = 5e-6;
+pub(crate) const LOCAL_MESSAGE_SECS: f64 = 5e-6;
 
 impl NetworkCosts {
     /// InfiniBand QDR as in the thesis' cluster: 3.2 GB/s, about a microsecond.

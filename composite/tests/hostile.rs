@@ -147,7 +147,7 @@ proptest! {
                 let honest_part = [0, 8, 24][keep].min(honest.len());
                 honest.truncate(honest_part);
                 honest.extend_from_slice(&received);
-                honest.truncate(32);
+                honest.truncate(36);
             }
         };
         let results = threads::run(3, |comm| {

@@ -60,6 +60,13 @@ pub trait SharedSegments {
     /// If there is not enough memory, [`attach`](Self::attach) tells all ranks of the machine.
     fn publish(&mut self, bytes: usize, used: usize, fill: &mut dyn FnMut(&mut [u8]));
 
+    /// Makes this rank's segment at least `bytes` long, where there is memory for it.
+    fn reserve(&mut self, bytes: usize);
+
+    /// Length of this rank's segment now: a [`publish`](Self::publish) of so many bytes finds enough
+    /// memory.
+    fn reserved(&self) -> usize;
+
     /// Opens the segments of all ranks of the machine. Returns false on all of them if any segment
     /// could not be made.
     ///

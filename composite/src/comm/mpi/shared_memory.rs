@@ -330,6 +330,15 @@ impl SharedSegments for SharedMemory {
         }
     }
 
+    fn reserve(&mut self, bytes: usize) {
+        // A failure shows in what is reserved.
+        let _ = self.make_segment(bytes);
+    }
+
+    fn reserved(&self) -> usize {
+        self.segments[self.place].as_ref().map_or(0, |segment| segment.mapping.bytes)
+    }
+
     fn attach(&mut self) -> Result<bool, CommError> {
         let rank = self.ranks[self.place];
         let failed = |place: usize, reason: String| CommError::Transport {
