@@ -12,7 +12,9 @@
 //! cell too large.
 
 use super::photons::Exposure;
-use super::{Film, Tally, quantize, trace_unless_cancelled};
+use super::polygon_area::{polygon_in_pixels, triangle_area};
+use super::signed_area::small_triangle_in_pixels;
+use super::{Film, Framing, Tally, quantize, trace_unless_cancelled};
 use crate::optics::PlaneVector;
 use crate::path::{Exit, Start, Status};
 use crate::technique::Photon;
@@ -169,130 +171,38 @@ fn corners<const C: usize>(
 /// Distributes the energy of a triangle: `area_px` is its original area, and its energy per pixel
 /// is the mean of its corners'. Returns whether any part falls on the film.
 fn deposit<const C: usize>(film: &Film<C>, t: [Corner; 3], area_px: f64) -> bool {
-    let framing = film.framing();
+    let Framing { width, height, .. } = *film.framing();
     let energy: [f64; C] = std::array::from_fn(|c| {
         t.iter().map(|p| f64::from(p.energy[c])).sum::<f64>() / 3.0 * area_px
     });
     let points = t.map(|p| p.at_px);
-    // Pixels that the triangle may cover. Where it ends at the edge of one, it has no area beyond.
-    let bounds = |axis: usize, size: u32| {
-        let low = points.iter().map(|p| p[axis]).fold(f64::INFINITY, f64::min).floor();
-        let high = points.iter().map(|p| p[axis]).fold(f64::NEG_INFINITY, f64::max).ceil();
-        (low.max(0.0) as i64)..(high.min(f64::from(size)) as i64)
-    };
-    let (columns, rows) = (bounds(0, framing.width), bounds(1, framing.height));
-    let area = polygon_area(&points);
-    let add_share = |x: i64, y: i64, share: f64| {
+    let area = triangle_area(&points);
+    let mut any = false;
+    let mut add_share = |[x, y]: [u32; 2], share: f64| {
         let shared = energy.map(|e| quantize((e * share) as f32));
-        film.add(y as usize * framing.width as usize + x as usize, shared, 0);
+        film.add(y as usize * width as usize + x as usize, shared, 0);
+        any = true;
     };
     // A triangle in a focus has no area, so all of its energy goes to one pixel.
     if area < 1e-9 {
-        let center = [0, 1].map(|i| ((points[0][i] + points[1][i] + points[2][i]) / 3.0).floor());
-        let inside = (0.0..f64::from(framing.width)).contains(&center[0])
-            && (0.0..f64::from(framing.height)).contains(&center[1]);
-        if inside {
-            add_share(center[0] as i64, center[1] as i64, 1.0);
-        }
-        return inside;
-    }
-    let mut any = false;
-    let triangle = Polygon::new(&points);
-    for y in rows {
-        let mut row = triangle;
-        row.clip(1, y as f64, 1.0);
-        row.clip(1, y as f64 + 1.0, -1.0);
-        for x in columns.clone() {
-            let mut cell = row;
-            cell.clip(0, x as f64, 1.0);
-            cell.clip(0, x as f64 + 1.0, -1.0);
-            let share = polygon_area(cell.points()) / area;
-            if share > 0.0 {
-                add_share(x, y, share);
-                any = true;
-            }
-        }
+        point_in_pixels(&points, [width, height], add_share);
+    } else if !small_triangle_in_pixels(&points, area, [width, height], &mut add_share) {
+        polygon_in_pixels(&points, area, [width, height], add_share);
     }
     any
 }
 
-/// A convex polygon. A triangle clipped by four lines has at most seven corners.
-#[derive(Clone, Copy)]
-struct Polygon {
-    corners: [[f64; 2]; 8],
-    len: usize,
-}
-
-impl Polygon {
-    fn new(points: &[[f64; 2]; 3]) -> Polygon {
-        let mut corners = [[0.0; 2]; 8];
-        corners[..3].copy_from_slice(points);
-        Polygon { corners, len: 3 }
+/// All of a triangle without area in the pixel of its middle.
+fn point_in_pixels(points: &[[f64; 2]; 3], size: [u32; 2], mut add: impl FnMut([u32; 2], f64)) {
+    let middle = [0, 1].map(|i| ((points[0][i] + points[1][i] + points[2][i]) / 3.0).floor());
+    if [0, 1].iter().all(|&i| (0.0..f64::from(size[i])).contains(&middle[i])) {
+        add(middle.map(|m| m as u32), 1.0);
     }
-
-    fn points(&self) -> &[[f64; 2]] {
-        &self.corners[..self.len]
-    }
-
-    /// Clips by a line across `axis` (Sutherland and Hodgman 1974): keeps the part above `limit` for
-    /// `side` = 1, the part below for -1. Where light is hardly bent, most triangles lie within one
-    /// pixel, so most clips end at the first two questions.
-    #[inline(always)]
-    fn clip(&mut self, axis: usize, limit: f64, side: f64) {
-        let len = self.len.min(8);
-        let mut distance = [0.0; 8];
-        let mut outside = 0u32;
-        for (i, p) in self.points().iter().enumerate() {
-            distance[i & 7] = side * (p[axis] - limit);
-            outside |= u32::from(distance[i & 7] < 0.0) << i;
-        }
-        if outside == 0 {
-            return;
-        }
-        if outside == (1 << len) - 1 {
-            self.len = 0;
-            return;
-        }
-        let mut out = Polygon { corners: [[0.0; 2]; 8], len: 0 };
-        for i in 0..len {
-            let next = if i + 1 == len { 0 } else { i + 1 };
-            let (p, q) = (self.corners[i], self.corners[next]);
-            let (p_outside, q_outside) = (outside >> i & 1, outside >> next & 1);
-            if p_outside == 0 {
-                out.push(p);
-            }
-            if p_outside != q_outside {
-                let t = distance[i] / (distance[i] - distance[next]);
-                let mut cut = [p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])];
-                cut[axis] = limit;
-                out.push(cut);
-            }
-        }
-        *self = out;
-    }
-
-    fn push(&mut self, p: [f64; 2]) {
-        // Rounding cannot make a ninth corner of a convex polygon.
-        if self.len < self.corners.len() {
-            self.corners[self.len] = p;
-            self.len += 1;
-        }
-    }
-}
-
-/// Area of a polygon of either orientation. Coordinates are relative to the first corner to avoid
-/// cancellation far from the origin.
-fn polygon_area(points: &[[f64; 2]]) -> f64 {
-    let Some((o, rest)) = points.split_first() else { return 0.0 };
-    let twice =
-        |w: &[[f64; 2]]| (w[0][0] - o[0]) * (w[1][1] - o[1]) - (w[1][0] - o[0]) * (w[0][1] - o[1]);
-    0.5 * rest.windows(2).map(twice).sum::<f64>().abs()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::Framing;
 
     fn corner(x: f64, y: f64) -> Corner {
         Corner { at_px: [x, y], energy: [1.0; 3] }

@@ -10,6 +10,8 @@
 
 pub mod beams;
 pub mod photons;
+mod polygon_area;
+mod signed_area;
 mod tile;
 pub mod traced;
 
