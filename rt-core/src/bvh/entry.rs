@@ -6,11 +6,12 @@ use super::instance_filter::InstanceFilter;
 use super::layout::wide::WideBvh;
 use super::mesh_group::MeshGroup;
 use super::placement::Placement;
-use super::query::TriangleTest;
+use super::query::{HitQuery, TriangleTest};
+use super::shape_packets;
 use super::stored_mesh::StoredMesh;
 use super::traverse::tree_view::TreeView;
 use super::triangle_bvh;
-use crate::ray::{Hit, HitBlock, Ray};
+use crate::ray::{Hit, HitBlock, Ray, RayBlock};
 use fearless_simd::Simd;
 
 #[derive(Clone, Copy)]
@@ -19,6 +20,28 @@ pub(super) enum Entry<'w> {
     Instance { number: u32, placement: &'w Placement, blas: &'w Blas },
     /// Many instances that share a tree.
     Group(&'w MeshGroup),
+}
+
+/// A shape whose primitives take many rays at once, and the tree of its primitives.
+pub(super) enum PacketShapeEntry<'w> {
+    Mesh { tree: &'w WideBvh, mesh: &'w StoredMesh },
+}
+
+impl PacketShapeEntry<'_> {
+    /// Traces blocks in local space; `hits` has none yet, and gets them as hits of `instance`.
+    pub(super) fn trace<S: Simd, Q: HitQuery>(
+        &self,
+        simd: S,
+        rays: &[RayBlock],
+        hits: &mut [HitBlock],
+        instance: u32,
+    ) {
+        match *self {
+            PacketShapeEntry::Mesh { tree, mesh } => {
+                shape_packets::trace::<S, Q, _>(simd, tree, mesh, rays, hits, instance);
+            }
+        }
+    }
 }
 
 impl<'w> Entry<'w> {
@@ -46,12 +69,13 @@ impl<'w> Entry<'w> {
         }
     }
 
-    /// The stored mesh that this is an instance of, and the tree of its pages.
+    /// What takes many rays at once, where this is an instance of such a shape.
     #[inline]
-    pub(super) fn pages(self) -> Option<(&'w WideBvh, &'w StoredMesh)> {
+    pub(super) fn packet_shape(self) -> Option<PacketShapeEntry<'w>> {
         let Entry::Instance { blas, .. } = self else { return None };
-        let Content::Shape { bvh, shape } = &blas.content else { return None };
-        Some((bvh, shape.as_any()?.downcast_ref()?))
+        let Content::Shape { bvh: tree, shape } = &blas.content else { return None };
+        let shape = shape.as_any()?;
+        Some(PacketShapeEntry::Mesh { tree, mesh: shape.downcast_ref()? })
     }
 
     /// The number that hits in this entry's tree are stored with until [`Entry::resolve`].

@@ -4,7 +4,6 @@ use super::entry::Entry;
 use super::instance_filter::InstanceFilter;
 use super::layout::wide::{ChildRef, Unit};
 use super::query::{HitQuery, TriangleTest};
-use super::stored_mesh;
 use super::streams::merge_hits;
 use super::traverse::single::{RaySetup, traverse_from};
 use super::traverse::tree_view::TreeView;
@@ -125,11 +124,11 @@ impl<T: TriangleTest, Q: HitQuery> EntryBlocks<'_, T, Q> {
                 }
             }
             None if inside.count_ones() > MAX_SINGLE_RAYS
-                && let Some((pages, mesh)) = entry.pages() =>
+                && let Some(shape) = entry.packet_shape() =>
             {
                 let local = std::slice::from_ref(&local);
                 let found = std::slice::from_mut(&mut found);
-                stored_mesh::trace::<S, Q>(simd, pages, mesh, local, found, entry.number());
+                shape.trace::<S, Q>(simd, local, found, entry.number());
             }
             _ => {
                 for lane in set_bits(inside) {

@@ -27,6 +27,7 @@ mod ray_query;
 mod refit;
 mod render_space;
 mod several_entries;
+mod shape_packets;
 mod stored_mesh;
 mod streams;
 mod top_level;

@@ -7,7 +7,6 @@ use super::options::Robustness;
 use super::placement::ORDINARY_LENGTHS;
 use super::placement::Placement;
 use super::query::{AnyHit, ClosestHit, FastTest, HitQuery, TriangleTest, WatertightTest};
-use super::stored_mesh;
 use super::world::{World, with_ordinary_length};
 use crate::bvh::traverse::block_hits::limits_of;
 use crate::bvh::traverse::incoherent;
@@ -460,8 +459,8 @@ pub(super) fn trace_tree<S: Simd, T: TriangleTest, Q: HitQuery>(
     packet: &mut Packet,
 ) {
     let Some(tree) = entry.triangles(filter) else {
-        if let Some((pages, mesh)) = entry.pages() {
-            stored_mesh::trace::<S, Q>(simd, pages, mesh, rays, hits, entry.number());
+        if let Some(shape) = entry.packet_shape() {
+            shape.trace::<S, Q>(simd, rays, hits, entry.number());
             return;
         }
         trace_tree_by_single_rays::<S, T, Q>(simd, entry, rays, hits, filter);

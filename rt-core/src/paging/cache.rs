@@ -87,6 +87,11 @@ impl<P: Paged> PageCache<P> {
         }
     }
 
+    /// Different for any two caches of a process.
+    pub(crate) fn key(&self) -> u64 {
+        self.key
+    }
+
     pub(crate) fn page_use(&self) -> PageUse {
         PageUse {
             bytes: self.bytes.load(Ordering::Relaxed),

@@ -6,9 +6,11 @@ use super::boxes::plane;
 use super::coordinates::Coordinates;
 use super::cut::MAX_LEAVES;
 use super::meshlet::{HEADER_WORDS, Header, MAX_NODES, NODE, NONE};
-use crate::bvh::layout::triangles::TRI_LEAF_UNITS;
+use super::place::TrianglePlace;
+use crate::bvh::layout::triangles::{TRI_LEAF_UNITS, leaf_floats, leaf_triangle_ids};
 use crate::bvh::layout::wide::{CHILD_ROW, ChildRef, LEAF_SIZE, NODE_UNITS, Unit, WIDTH};
 use fearless_simd::Simd;
+use glam::Vec3;
 
 const NODES: usize = NODE_UNITS * MAX_NODES;
 const LEAVES: usize = TRI_LEAF_UNITS * MAX_LEAVES;
@@ -34,6 +36,11 @@ pub(crate) struct ExpandedLeaves {
     indices: usize,
     ids: usize,
     coordinates: [Coordinates; 3],
+}
+
+/// A reference to a leaf of an expanded meshlet.
+fn leaf_reference(leaf: usize) -> ChildRef {
+    ChildRef::leaf(TRI_LEAF_UNITS * leaf, LEAF_SIZE)
 }
 
 impl Expanded {
@@ -140,6 +147,38 @@ impl ExpandedLeaves {
             self.expand(simd, words, number);
         }
         &self.units
+    }
+
+    /// The place of triangle `id` of the meshlet at `unit`, among the leaves that are expanded.
+    #[inline(never)]
+    pub(crate) fn place_of(&self, unit: usize, id: u32) -> TrianglePlace {
+        for leaf in (0..MAX_LEAVES).filter(|leaf| self.present >> leaf & 1 == 1) {
+            let ids = leaf_triangle_ids(leaf_floats(&self.units, leaf_reference(leaf)));
+            if let Some(slot) = ids.iter().position(|&i| i == id) {
+                return TrianglePlace::of_leaf(unit, leaf).in_slot(slot);
+            }
+        }
+        TrianglePlace::NONE
+    }
+
+    /// The number and the corners of the triangle in a slot of a leaf. `None` when there is no such
+    /// leaf.
+    #[inline(always)]
+    pub(crate) fn triangle<S: Simd>(
+        &mut self,
+        simd: S,
+        words: &[u32],
+        leaf: usize,
+        slot: usize,
+    ) -> Option<(u32, [Vec3; 3])> {
+        if leaf >= MAX_LEAVES || slot >= LEAF_SIZE {
+            return None;
+        }
+        let reference = leaf_reference(leaf);
+        let floats = leaf_floats(self.with(simd, words, reference), reference);
+        let at = |corner: usize, axis: usize| floats[4 * (3 * corner + axis) + slot];
+        let corner = |k: usize| Vec3::new(at(k, 0), at(k, 1), at(k, 2));
+        Some((leaf_triangle_ids(floats)[slot], [corner(0), corner(1), corner(2)]))
     }
 
     /// The units with the leaves in `slots` of a row of references.

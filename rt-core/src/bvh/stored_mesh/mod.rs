@@ -19,17 +19,17 @@
 //! ([`attributes`]), and are read when a hit on it is shaded.
 
 mod attributes;
-mod blocks;
 mod error;
 mod format;
 mod octahedral;
+mod packets;
 mod page;
 mod read;
+mod recent_hits;
 #[cfg(test)]
 mod tests;
 mod write;
 
-pub(crate) use blocks::trace;
 pub use error::StoredMeshError;
 pub use read::{StoredAttributes, StoredMesh};
 pub use write::{StoredMeshReport, StoredMeshWriter};

@@ -1,7 +1,7 @@
 //! A page of a stored mesh: a compact tree of a few thousand triangles.
 
 use super::format::PageEntry;
-use crate::bvh::compact::{CompactBvh, check_units, new_key};
+use crate::bvh::compact::{CompactBvh, TrianglePlace, check_units, new_key, with_cache};
 use crate::bvh::layout::triangles::{leaf_floats, leaf_triangle_ids};
 use crate::bvh::layout::wide::{ChildRef, LEAF_SIZE, Unit, WIDTH, WideBvh};
 use crate::bvh::query::{ClosestHit, WatertightTest};
@@ -81,6 +81,25 @@ impl Page {
         let leaf = dispatch!(level, simd => meshlets::search(simd, &view, &setup, ray.t_max, leaf));
         let best = leaf.inner.best;
         best.found.then_some(PageHit { first: self.first, id: best.prim, corners: leaf.corners })
+    }
+}
+
+impl Page {
+    /// The triangle at a place. `None` when it is not known.
+    pub(super) fn triangle_at(&self, level: Level, place: TrianglePlace) -> Option<PageHit> {
+        let (unit, leaf, slot) = place.parts()?;
+        let (units, key) = (&self.tree.bvh.units, self.tree.key);
+        if unit >= units.len() {
+            return None;
+        }
+        let reference = ChildRef::leaf(unit, 1);
+        let (id, corners) = with_cache(|cache| {
+            dispatch!(level, simd => {
+                let (expanded, words) = cache.meshlet(simd, key, units, reference);
+                expanded.leaves.triangle(simd, words, leaf, slot)
+            })
+        })?;
+        Some(PageHit { first: self.first, id, corners })
     }
 }
 

@@ -7,6 +7,7 @@ use super::format::{
     Attributes, ENTRY_BYTES, HEADER_BYTES, Header, MAGIC, NoHeader, PageEntry, VERSION,
 };
 use super::page::{Page, PageHit};
+use super::recent_hits;
 use crate::bvh::layout::wide::Unit;
 use crate::math::Aabb;
 use crate::paging::fields::checksum;
@@ -148,6 +149,11 @@ impl StoredMesh {
         self.failure.get().map(String::as_str)
     }
 
+    /// Different for any two meshes of a process.
+    pub(super) fn key(&self) -> u64 {
+        self.cache.key()
+    }
+
     /// Calls `work` with a page. `None` when it cannot be read.
     pub(super) fn with_page<R>(&self, number: u32, work: impl FnOnce(&Page) -> R) -> Option<R> {
         let page = |part: &Part| match part {
@@ -271,9 +277,11 @@ impl Shape for StoredMesh {
             scalar: found.scalar,
             color: found.color,
         };
+        let place = recent_hits::find(self.key(), page, ray, hit.t);
+        let known = self.with_page(page, |page| page.triangle_at(self.level, place)).flatten();
         // The same hit by a ray that ends there: it meets few boxes.
         let to_hit = Ray { t_min: hit.t, t_max: hit.t.next_up(), ..*ray };
-        let found = self.hit(page, &to_hit).or_else(|| self.hit(page, ray));
+        let found = known.or_else(|| self.hit(page, &to_hit)).or_else(|| self.hit(page, ray));
         let Some(PageHit { corners, id, .. }) = found else {
             // The page could be read for the hit and cannot be read now: the render fails.
             let against = -ray.dir.normalize_or_zero();

@@ -5,7 +5,7 @@ use crate::bvh::{BuildOptions, Geometry, Instance, World};
 use crate::mesh::{Attribute, MeshSlices, PerElement, TriMesh};
 use crate::paging::PageSource;
 use crate::ray::{HitBlock, LANES, Ray, RayBlock};
-use crate::shapes::Shape;
+use crate::shapes::{Shape, ShapeHit, ShapeSurface};
 use crate::test_shapes::Random;
 use glam::{DAffine3, DVec3, Vec3};
 use std::sync::{Arc, Mutex};
@@ -356,6 +356,45 @@ fn blocks_and_packets_have_the_hits_of_single_rays_bit_for_bit() {
         }
         assert_eq!(world.failure(), None);
     }
+}
+
+#[test]
+fn surfaces_of_packets_are_found_without_a_search_and_are_those_of_one_bit_for_bit() {
+    let (bytes, _) = store_painted(&painted(160, false), 0.0);
+    let [stored, other] =
+        [0, 1].map(|_| Arc::new(StoredMesh::open(bytes.clone(), 1 << 20).expect("sound bytes")));
+    let world = world_of(Geometry::Shape(stored.clone()));
+    assert_eq!(world.origin(), DVec3::ZERO);
+    let (eye, scattered) = (Vec3::new(0.3, 0.4, 3.0), rays(1024));
+    let pixel = |i: usize| {
+        let (x, y) = ((i / 256 % 2 * 16 + i % 16) as f32, (i / 512 * 16 + i / 16 % 16) as f32);
+        Ray::new(eye, Vec3::new(x / 16.0 - 1.0, y / 16.0 - 1.0, -4.0))
+    };
+    let image: Vec<Ray> = (0..1024).map(pixel).collect();
+    let mut counts = [(0, 0); 2];
+    let compare = || {
+        for (all, (hits, known)) in [&image, &scattered].into_iter().zip(&mut counts) {
+            let blocks = RayBlock::from_rays(all);
+            let mut found = vec![HitBlock::MISS; blocks.len()];
+            world.closest_coherent(&blocks, &mut found).expect("as many");
+            for (i, ray) in all.iter().enumerate() {
+                let Some(hit) = found[i / LANES].get(i % LANES) else { continue };
+                let place = recent_hits::find(stored.key(), hit.prim, ray, hit.t);
+                *hits += 1;
+                *known += usize::from(place.parts().is_some());
+                let at = ShapeHit { t: hit.t, u: hit.u, v: hit.v };
+                let [a, b] = [&stored, &other].map(|mesh| mesh.surface(hit.prim, &at, ray));
+                assert_eq!((a.point, a.normal, a.point_error), (b.point, b.normal, b.point_error));
+                let of = |s: &ShapeSurface| (s.shading_normal, s.scalar, s.color);
+                assert_eq!(of(&a), of(&b), "{ray:?}");
+            }
+        }
+    };
+    // What is kept is kept by the thread that traces.
+    rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool").install(compare);
+    let [(hits, known), (scattered, _)] = counts;
+    assert!(hits > 500 && known * 10 > hits * 9, "{known} of {hits} known");
+    assert!(scattered > 300, "{scattered}");
 }
 
 /// A ball with normals, colours and scalars: of vertices and of triangles in turns.

@@ -38,7 +38,7 @@ pub(crate) fn trace<S: Simd, T: TriangleTest, Q: HitQuery>(
     instance: u32,
 ) {
     if tree.meshlets() != 0 {
-        meshlets::trace_blocks::<S, T, Q>(simd, tree, rays, hits, instance);
+        meshlets::trace_blocks::<S, T, Q>(simd, tree, rays, hits, instance, &mut []);
         return;
     }
     for (rays, hits) in rays.chunks(GROUPS).zip(hits.chunks_mut(GROUPS)) {

@@ -89,6 +89,12 @@ pub(crate) trait LeafTest<S: Simd> {
     /// to [`inflate_t`] of the closest hit so far. Returns true when the search is over.
     fn test(&mut self, simd: S, units: &[Unit], leaf: ChildRef, skip_t: &mut f32) -> bool;
 
+    /// The number of the closest primitive so far, in tests that keep one.
+    #[inline(always)]
+    fn closest(&self) -> Option<u32> {
+        None
+    }
+
     /// Whether the leaves among a node's children are tested together, as soon as the ray has
     /// entered their boxes.
     const TOGETHER: bool = false;

@@ -90,6 +90,11 @@ impl<S: Simd, T: TriangleTest> LeafTest<S> for ClosestLeaf<'_, T> {
     const TOGETHER: bool = true;
 
     #[inline(always)]
+    fn closest(&self) -> Option<u32> {
+        if self.best.found { Some(self.best.prim) } else { None }
+    }
+
+    #[inline(always)]
     fn test_many(
         &mut self,
         simd: S,

@@ -3,7 +3,7 @@
 
 use super::Meshlets;
 use crate::bvh::Unit;
-use crate::bvh::compact::{MeshletCache, with_cache};
+use crate::bvh::compact::{MeshletCache, TrianglePlace, with_cache};
 use crate::bvh::layout::wide::{CHILD_ROW, ChildRef, NODE_UNITS, STACK_SIZE};
 use crate::bvh::query::{HitQuery, TriangleTest};
 use crate::bvh::traverse::block_boxes::BlockSetup;
@@ -29,7 +29,8 @@ struct Entry {
 }
 
 /// Traces blocks of rays and writes the results into `hits`, as long as `rays` (for occlusion,
-/// `prim` is 0 where something blocks the ray).
+/// `prim` is 0 where something blocks the ray). `places` gets where the closest triangles lie, for
+/// as many blocks as it has rows.
 #[inline(never)]
 pub(crate) fn trace_blocks<S: Simd, T: TriangleTest, Q: HitQuery>(
     simd: S,
@@ -37,16 +38,19 @@ pub(crate) fn trace_blocks<S: Simd, T: TriangleTest, Q: HitQuery>(
     rays: &[RayBlock],
     hits: &mut [HitBlock],
     instance: u32,
+    places: &mut [[TrianglePlace; LANES]],
 ) {
     with_cache(|cache| {
         simd.vectorize(
             #[inline(always)]
             || {
-                for (rays, hits) in rays.iter().zip(hits) {
+                for (b, (rays, hits)) in rays.iter().zip(hits).enumerate() {
+                    let places = places.get_mut(b);
                     let key = tree.meshlets();
                     let (t, active) = (rays.t_max, rays.active_lanes());
                     let kind = PhantomData::<(T, Q)>;
-                    let mut block = Block { tree, cache, key, t, active, hits, instance, kind };
+                    let mut block =
+                        Block { tree, cache, key, t, active, hits, places, instance, kind };
                     block.trace(simd, rays);
                 }
             },
@@ -64,6 +68,7 @@ struct Block<'a, T, Q> {
     /// Lanes that still search for a hit.
     active: u16,
     hits: &'a mut HitBlock,
+    places: Option<&'a mut [TrianglePlace; LANES]>,
     instance: u32,
     kind: PhantomData<(T, Q)>,
 }
@@ -122,7 +127,7 @@ impl<T: TriangleTest, Q: HitQuery> Block<'_, T, Q> {
     fn trace_ray<S: Simd>(&mut self, simd: S, start: ChildRef, lane: usize, ray: &RaySetup) {
         let t = self.t[lane];
         if Q::ANY {
-            if self.search(simd, start, ray, t, AnyLeaf::<T>::new(ray, t)).found {
+            if self.search(simd, start, ray, t, AnyLeaf::<T>::new(ray, t)).0.found {
                 self.hits.prim[lane] = 0;
                 self.active &= !(1 << lane);
             }
@@ -132,12 +137,16 @@ impl<T: TriangleTest, Q: HitQuery> Block<'_, T, Q> {
         let found = hits.prim[lane] != NO_HIT;
         let prim = if found { hits.prim[lane] } else { 0 };
         let best = ClosestTri { t, u: hits.u[lane], v: hits.v[lane], prim, found };
-        let b = self.search(simd, start, ray, t, ClosestLeaf::<T>::continuing(ray, best)).best;
+        let inner = ClosestLeaf::<T>::continuing(ray, best);
+        let (ClosestLeaf { best: b, .. }, place) = self.search(simd, start, ray, t, inner);
         if b.found {
             self.t[lane] = b.t;
             let hits = &mut *self.hits;
             (hits.t[lane], hits.u[lane], hits.v[lane]) = (b.t, b.u, b.v);
             (hits.prim[lane], hits.instance[lane]) = (b.prim, self.instance);
+            if let (Some(places), Some(place)) = (&mut self.places, place) {
+                places[lane] = place;
+            }
         }
     }
 
@@ -149,13 +158,13 @@ impl<T: TriangleTest, Q: HitQuery> Block<'_, T, Q> {
         ray: &RaySetup,
         t_max: f32,
         inner: L,
-    ) -> L {
-        let mut leaves = Meshlets { cache: &mut *self.cache, key: self.key, ray, inner };
+    ) -> (L, Option<TrianglePlace>) {
+        let mut leaves = Meshlets::new(&mut *self.cache, self.key, ray, inner);
         if start.is_leaf() {
             leaves.test(simd, self.tree.units, start, &mut inflate_t(t_max));
         } else {
             traverse_from(simd, self.tree, ray, t_max, start, &mut leaves);
         }
-        leaves.inner
+        (leaves.inner, leaves.place)
     }
 }

@@ -2,7 +2,7 @@
 
 mod blocks;
 
-use crate::bvh::compact::{Expanded, MeshletCache, with_cache};
+use crate::bvh::compact::{Expanded, MeshletCache, TrianglePlace, with_cache};
 use crate::bvh::layout::wide::{CHILD_ROW, ChildRef, NODE_UNITS, Unit, WIDTH};
 use crate::bvh::query::{HitQuery, TriangleTest};
 use crate::bvh::traverse::single::{
@@ -23,6 +23,20 @@ pub(crate) struct Meshlets<'a, L> {
     pub(crate) key: u64,
     pub(crate) ray: &'a RaySetup,
     pub(crate) inner: L,
+    /// The place of the closest triangle, where this search has found it.
+    pub(crate) place: Option<TrianglePlace>,
+}
+
+impl<'a, L> Meshlets<'a, L> {
+    #[inline(always)]
+    pub(crate) fn new(
+        cache: &'a mut MeshletCache,
+        key: u64,
+        ray: &'a RaySetup,
+        inner: L,
+    ) -> Meshlets<'a, L> {
+        Meshlets { cache, key, ray, inner, place: None }
+    }
 }
 
 impl<S: Simd, L: LeafTest<S>> LeafTest<S> for Meshlets<'_, L> {
@@ -31,7 +45,15 @@ impl<S: Simd, L: LeafTest<S>> LeafTest<S> for Meshlets<'_, L> {
     #[inline(always)]
     fn test(&mut self, simd: S, units: &[Unit], leaf: ChildRef, skip_t: &mut f32) -> bool {
         let (expanded, words) = self.cache.meshlet(simd, self.key, units, leaf);
-        visit(simd, expanded, words, self.ray, skip_t, &mut self.inner)
+        let before = self.inner.closest();
+        let over = visit(simd, expanded, words, self.ray, skip_t, &mut self.inner);
+        let after = self.inner.closest();
+        if after != before
+            && let Some(id) = after
+        {
+            self.place = Some(expanded.leaves.place_of(leaf.unit(), id));
+        }
+        over
     }
 }
 
@@ -117,7 +139,7 @@ pub(crate) fn search<S: Simd, L: LeafTest<S>>(
     inner: L,
 ) -> L {
     with_cache(|cache| {
-        let mut leaves = Meshlets { cache, key: tree.meshlets(), ray, inner };
+        let mut leaves = Meshlets::new(cache, tree.meshlets(), ray, inner);
         traverse(simd, tree, ray, t_max, &mut leaves);
         leaves.inner
     })
@@ -137,7 +159,7 @@ pub(crate) fn closest<S: Simd, T: TriangleTest>(
                 let setup = RaySetup::new(ray);
                 let inner = ClosestLeaf::<T>::new(&setup, ray.t_max);
                 let key = tree.meshlets();
-                let mut leaves = Meshlets { cache, key, ray: &setup, inner };
+                let mut leaves = Meshlets::new(cache, key, &setup, inner);
                 traverse_body(simd, tree, &setup, ray.t_max, &mut leaves);
                 leaves.inner.best
             },
@@ -155,7 +177,7 @@ pub(crate) fn occluded<S: Simd, T: TriangleTest>(simd: S, tree: &TreeView<'_>, r
                 let setup = RaySetup::new(ray);
                 let inner = AnyLeaf::<T>::new(&setup, ray.t_max);
                 let key = tree.meshlets();
-                let mut leaves = Meshlets { cache, key, ray: &setup, inner };
+                let mut leaves = Meshlets::new(cache, key, &setup, inner);
                 traverse_body(simd, tree, &setup, ray.t_max, &mut leaves);
                 leaves.inner.found
             },

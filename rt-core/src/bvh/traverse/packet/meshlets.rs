@@ -6,9 +6,11 @@ use super::{
     SeparateOrigins, SlabCounts, Triangles,
 };
 use crate::bvh::Unit;
-use crate::bvh::compact::{ExpandedLeaves, MeshletCache, with_cache};
-use crate::bvh::layout::wide::ChildRef;
+use crate::bvh::compact::{ExpandedLeaves, MeshletCache, TrianglePlace, with_cache};
+use crate::bvh::layout::triangles::{TRI_LEAF_UNITS, leaf_floats, leaf_triangle_ids};
+use crate::bvh::layout::wide::{ChildRef, LEAF_SIZE};
 use crate::bvh::query::{HitQuery, TriangleTest};
+use crate::bvh::traverse::block_hits::set_bits;
 use crate::bvh::traverse::meshlets;
 use crate::bvh::traverse::packet::strategy::Strategy;
 use crate::bvh::traverse::single::traverse_from;
@@ -20,6 +22,22 @@ use fearless_simd::Simd;
 use std::marker::PhantomData;
 
 impl Packet {
+    /// Keeps the places of the closest triangles that are those with these numbers, in the slots of
+    /// one leaf, where some lane of the groups `changed` has just found one of them.
+    #[inline(always)]
+    fn keep_places(&mut self, changed: u16, ids: &[u32; LEAF_SIZE], first: TrianglePlace) {
+        for g in set_bits(changed) {
+            let (prims, places) = (&self.prim[g], &mut self.place[g]);
+            for slot in 0..LEAF_SIZE {
+                let place = first.in_slot(slot);
+                for lane in 0..LANES {
+                    let is_this = prims[lane] == ids[slot];
+                    places[lane] = if is_this { place } else { places[lane] };
+                }
+            }
+        }
+    }
+
     /// As the walk through an ordinary tree.
     pub(super) fn walk_compact<S: Simd, T: TriangleTest, Q: HitQuery>(
         &mut self,
@@ -82,7 +100,8 @@ impl<S: Simd, T: TriangleTest, Q: HitQuery, O: PacketOrigin, B: BoxTest> PacketL
     ) -> u16 {
         let (expanded, words) = self.cache.meshlet(simd, self.key, units, leaf);
         let (nodes, leaves) = expanded.parts();
-        let mut inner = MeshletLeaves { triangles: &mut self.triangles, leaves, words, changed: 0 };
+        let (triangles, unit) = (&mut self.triangles, leaf.unit());
+        let mut inner = MeshletLeaves { triangles, leaves, words, unit, changed: 0 };
         let groups = std::mem::replace(&mut packet.groups, reached);
         packet.walk::<S, _, B>(simd, &TreeView::of_units(nodes), &mut inner, 0);
         packet.groups = groups;
@@ -137,7 +156,7 @@ impl<T: TriangleTest, Q: HitQuery, O, B> Meshlets<'_, T, Q, O, B> {
         let (cache, key) = (&mut *self.cache, self.key);
         if Q::ANY {
             let inner = AnyLeaf::<T>::new(ray, t);
-            let mut leaves = meshlets::Meshlets { cache, key, ray, inner };
+            let mut leaves = meshlets::Meshlets::new(cache, key, ray, inner);
             traverse_from(simd, tree, ray, t, node, &mut leaves);
             if !leaves.inner.found {
                 return 0;
@@ -149,7 +168,7 @@ impl<T: TriangleTest, Q: HitQuery, O, B> Meshlets<'_, T, Q, O, B> {
             let (u, v) = (packet.u[g][lane], packet.v[g][lane]);
             let best = ClosestTri { t, u, v, prim: packet.prim[g][lane], found };
             let inner = ClosestLeaf::<T>::continuing(ray, best);
-            let mut leaves = meshlets::Meshlets { cache, key, ray, inner };
+            let mut leaves = meshlets::Meshlets::new(cache, key, ray, inner);
             traverse_from(simd, tree, ray, t, node, &mut leaves);
             let b = leaves.inner.best;
             if !b.found {
@@ -157,6 +176,9 @@ impl<T: TriangleTest, Q: HitQuery, O, B> Meshlets<'_, T, Q, O, B> {
             }
             (packet.t[g][lane], packet.prim[g][lane]) = (b.t, b.prim);
             (packet.u[g][lane], packet.v[g][lane]) = (b.u, b.v);
+            if let Some(place) = leaves.place {
+                packet.place[g][lane] = place;
+            }
         }
         packet.hit[g] |= 1 << lane;
         1 << g
@@ -168,6 +190,8 @@ struct MeshletLeaves<'m, T, Q, O> {
     triangles: &'m mut Triangles<T, Q, O>,
     leaves: &'m mut ExpandedLeaves,
     words: &'m [u32],
+    /// The first unit of the meshlet.
+    unit: usize,
     /// Groups with new hits.
     changed: u16,
 }
@@ -189,6 +213,10 @@ impl<S: Simd, T: TriangleTest, Q: HitQuery, O: PacketOrigin> PacketLeaf<S>
     ) -> u16 {
         let units = self.leaves.with(simd, self.words, leaf);
         let changed = self.triangles.leaf(packet, simd, units, leaf, reached, lanes);
+        if !Q::ANY && changed != 0 {
+            let first = TrianglePlace::of_leaf(self.unit, leaf.unit() / TRI_LEAF_UNITS);
+            packet.keep_places(changed, &leaf_triangle_ids(leaf_floats(units, leaf)), first);
+        }
         self.changed |= changed;
         changed
     }

@@ -21,6 +21,7 @@ mod triangles;
 mod walk;
 
 use crate::bvh::Unit;
+use crate::bvh::compact::TrianglePlace;
 use crate::bvh::layout::wide::ChildRef;
 use crate::bvh::query::{HitQuery, TriangleTest};
 use crate::bvh::traverse::single::RaySetup;
@@ -51,6 +52,8 @@ pub(crate) struct Packet {
     pub(crate) u: [Row; GROUPS],
     pub(crate) v: [Row; GROUPS],
     pub(crate) prim: [[u32; LANES]; GROUPS],
+    /// Where the closest triangles lie, in compact trees; without a meaning in lanes without a hit.
+    pub(crate) place: [[TrianglePlace; LANES]; GROUPS],
     /// Lanes that still search for a hit.
     active: [u16; GROUPS],
     /// Lanes that have a hit.
@@ -102,6 +105,7 @@ impl Packet {
             u: [[0.0; LANES]; GROUPS],
             v: [[0.0; LANES]; GROUPS],
             prim: [[0; LANES]; GROUPS],
+            place: [[TrianglePlace::NONE; LANES]; GROUPS],
             active: [0; GROUPS],
             hit: [0; GROUPS],
             rcp_bounds: [[[0.0; LANES]; 2]; 3],

@@ -1,40 +1,72 @@
-//! Many rays through a stored mesh: a packet, or a block of sixteen, goes down the tree of pages
-//! together, and the rays that meet a page enter it together. So a page is looked up once for all
-//! of them, and what is expanded of it serves all of them.
+//! Many rays through a shape of large primitives, the pages of a stored mesh: a packet, or a block of
+//! sixteen, goes down the tree of primitives together, and the rays that meet a primitive enter it
+//! together. So a page is looked up once for all of them, and what is expanded of it serves all of
+//! them.
 
-use super::StoredMesh;
-use super::page::Page;
 use crate::bvh::blas::{ShapeAny, ShapeClosest};
+use crate::bvh::compact::TrianglePlace;
 use crate::bvh::layout::id_leaf::leaf_primitive_ids;
 use crate::bvh::layout::wide::{ChildRef, Unit, WideBvh};
-use crate::bvh::query::{HitQuery, WatertightTest};
+use crate::bvh::query::HitQuery;
 use crate::bvh::traverse::block_entries::{BlockEntries, traverse_block};
 use crate::bvh::traverse::block_hits::{limits_of, set_bits};
-use crate::bvh::traverse::meshlets;
 use crate::bvh::traverse::packet::{GROUPS, Packet, PacketEntries, PacketLimits, RaysLeft};
 use crate::bvh::traverse::single::{RaySetup, traverse_from};
 use crate::bvh::traverse::tree_view::TreeView;
 use crate::bvh::traverse::triangle_leaf::ClosestTri;
 use crate::ray::{HitBlock, LANES, NO_HIT, RayBlock};
+use crate::shapes::Shape;
 use fearless_simd::Simd;
 use std::cell::Cell;
 use std::marker::PhantomData;
 
-/// With fewer groups of sixteen rays, each goes through a page by itself.
-const FEWEST_GROUPS: usize = 3;
+/// A shape whose primitives take many rays at once.
+pub(super) trait PacketShape: Shape {
+    /// At most sixteen blocks through primitive `prim`; lanes whose ranges are empty hit nothing. The
+    /// hits are those of [`Shape::closest`]; `hits` has none yet, and
+    /// gets any number of a primitive where there is one.
+    fn trace<S: Simd, Q: HitQuery>(
+        &self,
+        simd: S,
+        prim: u32,
+        rays: &[RayBlock],
+        hits: &mut [HitBlock],
+        room: PacketRoom<'_>,
+    );
+
+    /// Gets the closest hits of the rays, with the places of triangles where they are known, for
+    /// shading, which will ask for the surface at each.
+    fn keep_places(
+        &self,
+        _rays: &[RayBlock],
+        _hits: &[HitBlock],
+        _places: &[[TrianglePlace; LANES]],
+    ) {
+    }
+}
+
+/// What a primitive's rays may use.
+pub(super) struct PacketRoom<'a> {
+    /// For anything.
+    pub(super) packet: &'a mut Packet,
+    /// Gets where hit triangles lie in the primitive. It has none yet.
+    pub(super) places: &'a mut [[TrianglePlace; LANES]],
+}
 
 /// Per-thread buffers.
 struct Room {
-    /// Rays on their way to pages, and in one.
+    /// Rays on their way to primitives, and in one.
     outer: Box<Packet>,
-    inner: PageRays,
+    places: [[TrianglePlace; LANES]; GROUPS],
+    inner: PrimitiveRays,
 }
 
-/// The rays that enter a page, and what they hit there.
-struct PageRays {
+/// The rays that enter a primitive, and what they hit there.
+struct PrimitiveRays {
     packet: Box<Packet>,
     rays: [RayBlock; GROUPS],
     hits: [HitBlock; GROUPS],
+    places: [[TrianglePlace; LANES]; GROUPS],
 }
 
 thread_local! {
@@ -44,17 +76,18 @@ thread_local! {
 impl Room {
     fn new() -> Box<Room> {
         let (rays, hits) = ([RayBlock::INACTIVE; GROUPS], [HitBlock::MISS; GROUPS]);
-        let inner = PageRays { packet: Packet::new(), rays, hits };
-        Box::new(Room { outer: Packet::new(), inner })
+        let places = [[TrianglePlace::NONE; LANES]; GROUPS];
+        let inner = PrimitiveRays { packet: Packet::new(), rays, hits, places };
+        Box::new(Room { outer: Packet::new(), places, inner })
     }
 }
 
-/// Traces blocks in the local space of a stored mesh, of which `pages` is the tree. The hits are
-/// those of single rays, bit for bit; `hits` has none yet.
-pub(crate) fn trace<S: Simd, Q: HitQuery>(
+/// Traces blocks in the local space of a shape, of whose primitives `tree` is the tree. The hits
+/// are those of single rays, bit for bit; `hits` has none yet.
+pub(super) fn trace<S: Simd, Q: HitQuery, P: PacketShape>(
     simd: S,
-    pages: &WideBvh,
-    mesh: &StoredMesh,
+    tree: &WideBvh,
+    shape: &P,
     rays: &[RayBlock],
     hits: &mut [HitBlock],
     instance: u32,
@@ -62,34 +95,43 @@ pub(crate) fn trace<S: Simd, Q: HitQuery>(
     // Should a page be read by a caller's function that traces rays itself, it makes room of its
     // own.
     let mut room = ROOM.take().unwrap_or_else(Room::new);
-    let Room { outer, inner } = &mut *room;
+    let Room { outer, places, inner } = &mut *room;
     for (rays, hits) in rays.chunks(GROUPS).zip(hits.chunks_mut(GROUPS)) {
+        let places = &mut places[..rays.len()];
+        places.fill([TrianglePlace::NONE; LANES]);
+        let query = PhantomData::<Q>;
         if outer.load(simd, rays, &PacketLimits::NONE) {
-            let mut packet = Rays::<Q> { mesh, rays, hits, instance, inner, query: PhantomData };
-            outer.visit_entries(simd, &TreeView::all(pages), &mut packet);
-            continue;
+            let (hits, places) = (&mut *hits, &mut *places);
+            let mut packet = Rays { shape, rays, hits, places, instance, inner, query };
+            outer.visit_entries(simd, &TreeView::all(tree), &mut packet);
+        } else {
+            let blocks = rays.chunks(1).zip(hits.chunks_mut(1)).zip(places.chunks_mut(1));
+            for ((rays, hits), places) in blocks {
+                let active = rays[0].active_lanes();
+                let mut block = Rays { shape, rays, hits, places, instance, inner, query };
+                traverse_block(simd, tree, &rays[0], active, &mut block);
+            }
         }
-        for (rays, hits) in rays.chunks(1).zip(hits.chunks_mut(1)) {
-            let active = rays[0].active_lanes();
-            let mut block = Rays::<Q> { mesh, rays, hits, instance, inner, query: PhantomData };
-            traverse_block(simd, pages, &rays[0], active, &mut block);
+        if !Q::ANY {
+            shape.keep_places(rays, hits, places);
         }
     }
     ROOM.set(Some(room));
 }
 
-/// A packet, or a block, on its way through the tree of pages.
-struct Rays<'a, Q> {
-    mesh: &'a StoredMesh,
+/// A packet, or a block, on its way through the tree of primitives.
+struct Rays<'a, Q, P> {
+    shape: &'a P,
     rays: &'a [RayBlock],
     hits: &'a mut [HitBlock],
+    places: &'a mut [[TrianglePlace; LANES]],
     instance: u32,
-    inner: &'a mut PageRays,
+    inner: &'a mut PrimitiveRays,
     query: PhantomData<Q>,
 }
 
-impl<Q: HitQuery> Rays<'_, Q> {
-    /// The rays `lanes` of the groups `reached` through a page. Returns the groups with nearer
+impl<Q: HitQuery, P: PacketShape> Rays<'_, Q, P> {
+    /// The rays `lanes` of the groups `reached` through a primitive. Returns the groups with nearer
     /// hits.
     #[inline(always)]
     fn enter<S: Simd>(
@@ -113,7 +155,7 @@ impl<Q: HitQuery> Rays<'_, Q> {
         reached: u16,
         lanes: impl Fn(usize) -> u16,
     ) -> u16 {
-        let PageRays { packet, rays: local, hits: found } = &mut *self.inner;
+        let PrimitiveRays { packet, rays: local, hits: found, places } = &mut *self.inner;
         let (mut n, mut entered) = (0, [0; GROUPS]);
         for g in set_bits(reached) {
             let limits = limits_of::<Q>(&self.rays[g], &self.hits[g]);
@@ -133,38 +175,45 @@ impl<Q: HitQuery> Rays<'_, Q> {
         if n == 0 {
             return 0;
         }
-        let (local, found) = (&local[..n], &mut found[..n]);
+        let (local, found, places) = (&local[..n], &mut found[..n], &mut places[..n]);
         found.fill(HitBlock::MISS);
-        self.mesh.with_page(number, |page| page.trace::<S, Q>(simd, local, found, packet));
+        places.fill([TrianglePlace::NONE; LANES]);
+        let room = PacketRoom { packet, places: &mut *places };
+        self.shape.trace::<S, Q>(simd, number, local, found, room);
         let mut changed = 0;
-        for (found, &g) in found.iter().zip(&entered) {
+        for ((found, places), &g) in found.iter().zip(&*places).zip(&entered) {
             let nearer = merge::<Q>(&mut self.hits[g], found, number, self.instance);
-            changed |= u16::from(nearer) << g;
+            for lane in 0..LANES {
+                let is_nearer = nearer >> lane & 1 == 1;
+                let place = &mut self.places[g][lane];
+                *place = if is_nearer { places[lane] } else { *place };
+            }
+            changed |= u16::from(nearer != 0) << g;
         }
         changed
     }
 }
 
-/// Keeps what was found in a page where it is nearer; of two hits at the same distance, that in the
-/// page with the lower number. Returns whether there is any.
+/// Keeps what was found in primitive `prim` where it is nearer; of two hits at the same distance,
+/// that of the primitive with the lower number. Returns the lanes where it is kept.
 #[inline(always)]
-fn merge<Q: HitQuery>(hits: &mut HitBlock, found: &HitBlock, page: u32, instance: u32) -> bool {
-    let mut any = false;
+fn merge<Q: HitQuery>(hits: &mut HitBlock, found: &HitBlock, prim: u32, instance: u32) -> u16 {
+    let mut kept = 0;
     for lane in 0..LANES {
         let t = found.t[lane];
-        let tie = (t == hits.t[lane]) & (page < hits.prim[lane]);
+        let tie = (t == hits.t[lane]) & (prim < hits.prim[lane]);
         let better = (found.prim[lane] != NO_HIT) & (Q::ANY | (t < hits.t[lane]) | tie);
-        any |= better;
+        kept |= u16::from(better) << lane;
         hits.t[lane] = if better { t } else { hits.t[lane] };
         hits.u[lane] = if better { found.u[lane] } else { hits.u[lane] };
         hits.v[lane] = if better { found.v[lane] } else { hits.v[lane] };
-        hits.prim[lane] = if better { page } else { hits.prim[lane] };
+        hits.prim[lane] = if better { prim } else { hits.prim[lane] };
         hits.instance[lane] = if better { instance } else { hits.instance[lane] };
     }
-    any
+    kept
 }
 
-impl<S: Simd, Q: HitQuery> PacketEntries<S> for Rays<'_, Q> {
+impl<S: Simd, Q: HitQuery, P: PacketShape> PacketEntries<S> for Rays<'_, Q, P> {
     type Query = Q;
 
     #[inline(never)]
@@ -178,8 +227,8 @@ impl<S: Simd, Q: HitQuery> PacketEntries<S> for Rays<'_, Q> {
         mut left: RaysLeft<'_>,
     ) -> u16 {
         let mut changed = 0;
-        for &page in leaf_primitive_ids(units, leaf) {
-            changed |= self.enter(simd, page, reached, |g| lanes[g & 15]);
+        for &prim in leaf_primitive_ids(units, leaf) {
+            changed |= self.enter(simd, prim, reached, |g| lanes[g & 15]);
         }
         for g in set_bits(changed) {
             left.lower::<Q>(g, &self.hits[g]);
@@ -188,7 +237,7 @@ impl<S: Simd, Q: HitQuery> PacketEntries<S> for Rays<'_, Q> {
     }
 }
 
-impl<S: Simd, Q: HitQuery> BlockEntries<S> for Rays<'_, Q> {
+impl<S: Simd, Q: HitQuery, P: PacketShape> BlockEntries<S> for Rays<'_, Q, P> {
     type Query = Q;
 
     #[inline(never)]
@@ -201,8 +250,8 @@ impl<S: Simd, Q: HitQuery> BlockEntries<S> for Rays<'_, Q> {
         t: &mut [f32; LANES],
         active: &mut u16,
     ) {
-        for &page in leaf_primitive_ids(units, leaf) {
-            if self.enter(simd, page, 1, |_| lanes & *active) == 0 {
+        for &prim in leaf_primitive_ids(units, leaf) {
+            if self.enter(simd, prim, 1, |_| lanes & *active) == 0 {
                 continue;
             }
             let hits = &self.hits[0];
@@ -229,7 +278,7 @@ impl<S: Simd, Q: HitQuery> BlockEntries<S> for Rays<'_, Q> {
             #[inline(always)]
             || {
                 for lane in set_bits(lanes) {
-                    let (shape, ray) = (self.mesh, self.rays[0].get(lane));
+                    let (shape, ray) = (self.shape, self.rays[0].get(lane));
                     let (setup, hits) = (&setups[lane], &mut self.hits[0]);
                     if Q::ANY {
                         let mut leaves = ShapeAny { shape, ray, found: false };
@@ -249,30 +298,13 @@ impl<S: Simd, Q: HitQuery> BlockEntries<S> for Rays<'_, Q> {
                     let best = leaves.best;
                     if best.found {
                         t[lane] = best.t;
+                        // A ray that goes alone does not say where its triangle lies.
+                        self.places[0][lane] = TrianglePlace::NONE;
                         (hits.t[lane], hits.u[lane], hits.v[lane]) = (best.t, best.u, best.v);
                         (hits.prim[lane], hits.instance[lane]) = (best.prim, self.instance);
                     }
                 }
             },
         );
-    }
-}
-
-impl Page {
-    /// At most sixteen blocks through the page; the primitives of hits are its triangles.
-    fn trace<S: Simd, Q: HitQuery>(
-        &self,
-        simd: S,
-        rays: &[RayBlock],
-        hits: &mut [HitBlock],
-        packet: &mut Packet,
-    ) {
-        let tree = self.view();
-        if rays.len() >= FEWEST_GROUPS && packet.load(simd, rays, &PacketLimits::NONE) {
-            packet.trace::<S, WatertightTest, Q>(simd, &tree);
-            packet.store::<Q>(hits, 0);
-        } else {
-            meshlets::trace_blocks::<S, WatertightTest, Q>(simd, &tree, rays, hits, 0);
-        }
     }
 }
