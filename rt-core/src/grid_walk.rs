@@ -40,6 +40,12 @@ impl IndexRay {
         IndexRay { o: (o / spacing).to_array(), d: d.to_array(), inverse: d.recip().to_array() }
     }
 
+    /// One of several rays that were converted together: `inverse` are the reciprocals of `d`.
+    #[inline(always)]
+    pub(crate) fn of_parts(o: [f64; 3], d: [f64; 3], inverse: [f64; 3]) -> Self {
+        IndexRay { o, d, inverse }
+    }
+
     /// Whether all its numbers and their reciprocals are finite, and it moves.
     #[inline]
     pub(crate) fn is_plain(&self) -> bool {
@@ -66,22 +72,24 @@ impl IndexRay {
     }
 
     /// The continuous index at `t`.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn at(&self, t: f64) -> [f64; 3] {
-        std::array::from_fn(|a| self.o[a] + t * self.d[a])
+        let at = |a: usize| self.o[a] + t * self.d[a];
+        [at(0), at(1), at(2)]
     }
 
     /// Entry and exit position of a crossing inside its cell, 0..=1. The coordinate perpendicular
     /// to a face is exactly 0 or 1, and the other coordinates are the same numbers for both cells
     /// of the face.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn fractions(&self, c: &Crossing, size: i64) -> ([f64; 3], [f64; 3]) {
         let scale = 1.0 / size as f64;
-        let inside = |t: f64| -> [f64; 3] {
-            let p = self.at(t);
-            std::array::from_fn(|a| ((p[a] - c.cell[a] as f64) * scale).clamp(0.0, 1.0))
-        };
-        let (mut p, mut q) = (inside(c.t0), inside(c.t1));
+        let (mut p, mut q) = (self.at(c.t0), self.at(c.t1));
+        for a in 0..3 {
+            let cell = c.cell[a] as f64;
+            p[a] = ((p[a] - cell) * scale).clamp(0.0, 1.0);
+            q[a] = ((q[a] - cell) * scale).clamp(0.0, 1.0);
+        }
         if let Some(a) = c.entry {
             p[a] = if self.d[a] > 0.0 { 0.0 } else { 1.0 };
         }

@@ -10,7 +10,7 @@
 
 /// Trilinear values at the eight corners of the box from `p` to `q` inside a cell (0..=1 per axis),
 /// x fastest.
-#[inline]
+#[inline(always)]
 fn resample(v: &[f64; 8], p: &[f64; 3], q: &[f64; 3]) -> [f64; 8] {
     // (1−f)·a + f·b gives a and b exactly at 0 and 1, so a point on a face has the same value in
     // both cells.
@@ -30,7 +30,7 @@ fn resample(v: &[f64; 8], p: &[f64; 3], q: &[f64; 3]) -> [f64; 8] {
 
 /// Bernstein coefficients on 0..=1 of the interpolant from `p` to `q`: the blossom of a trilinear
 /// function, averaged over which coordinates are taken from `q`.
-#[inline]
+#[inline(always)]
 pub(crate) fn along(corners: &[f64; 8], p: &[f64; 3], q: &[f64; 3]) -> [f64; 4] {
     let r = resample(corners, p, q);
     const THIRD: f64 = 1.0 / 3.0;
@@ -80,12 +80,18 @@ pub(crate) fn split(b: &[f64; 4], u: f64) -> ([f64; 4], [f64; 4]) {
 /// If the first and the last coefficient differ in this sense, there always is such a u. So two
 /// cells that agree on the value at their common face cannot both miss a surface that passes
 /// between them.
-#[inline]
+#[inline(always)]
 pub(crate) fn first_change(b: &[f64; 4]) -> Option<f64> {
-    let below = b.map(|x| x < 0.0);
+    let below = [b[0] < 0.0, b[1] < 0.0, b[2] < 0.0, b[3] < 0.0];
     if below[0] == below[1] && below[1] == below[2] && below[2] == below[3] {
         return None; // a Bernstein polynomial stays within its coefficients
     }
+    change_between(b, below)
+}
+
+/// [`first_change`] of coefficients of which some are below zero and some are not.
+#[inline]
+fn change_between(b: &[f64; 4], below: [bool; 4]) -> Option<f64> {
     let changes = (below[0] != below[1]) as u32
         + (below[1] != below[2]) as u32
         + (below[2] != below[3]) as u32;

@@ -12,6 +12,7 @@ use super::stored_mesh::StoredMesh;
 use super::traverse::tree_view::TreeView;
 use super::triangle_bvh;
 use crate::ray::{Hit, HitBlock, Ray, RayBlock};
+use crate::stored_volume::StoredIsosurface;
 use fearless_simd::Simd;
 
 #[derive(Clone, Copy)]
@@ -25,6 +26,7 @@ pub(super) enum Entry<'w> {
 /// A shape whose primitives take many rays at once, and the tree of its primitives.
 pub(super) enum PacketShapeEntry<'w> {
     Mesh { tree: &'w WideBvh, mesh: &'w StoredMesh },
+    Isosurface { tree: &'w WideBvh, surface: &'w StoredIsosurface },
 }
 
 impl PacketShapeEntry<'_> {
@@ -39,6 +41,9 @@ impl PacketShapeEntry<'_> {
         match *self {
             PacketShapeEntry::Mesh { tree, mesh } => {
                 shape_packets::trace::<S, Q, _>(simd, tree, mesh, rays, hits, instance);
+            }
+            PacketShapeEntry::Isosurface { tree, surface } => {
+                shape_packets::trace::<S, Q, _>(simd, tree, surface, rays, hits, instance);
             }
         }
     }
@@ -75,7 +80,11 @@ impl<'w> Entry<'w> {
         let Entry::Instance { blas, .. } = self else { return None };
         let Content::Shape { bvh: tree, shape } = &blas.content else { return None };
         let shape = shape.as_any()?;
-        Some(PacketShapeEntry::Mesh { tree, mesh: shape.downcast_ref()? })
+        if let Some(mesh) = shape.downcast_ref() {
+            return Some(PacketShapeEntry::Mesh { tree, mesh });
+        }
+        let surface = shape.downcast_ref()?;
+        Some(PacketShapeEntry::Isosurface { tree, surface })
     }
 
     /// The number that hits in this entry's tree are stored with until [`Entry::resolve`].

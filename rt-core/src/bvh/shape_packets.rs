@@ -1,7 +1,7 @@
-//! Many rays through a shape of large primitives, the pages of a stored mesh: a packet, or a block of
-//! sixteen, goes down the tree of primitives together, and the rays that meet a primitive enter it
-//! together. So a page is looked up once for all of them, and what is expanded of it serves all of
-//! them.
+//! Many rays through a shape of large primitives, the pages of a stored mesh or the bricks of a
+//! stored volume: a packet, or a block of sixteen, goes down the tree of primitives together, and
+//! the rays that meet a primitive enter it together. So a page is looked up once for all of them,
+//! and what is expanded of it serves all of them.
 
 use crate::bvh::blas::{ShapeAny, ShapeClosest};
 use crate::bvh::compact::TrianglePlace;
@@ -16,6 +16,7 @@ use crate::bvh::traverse::tree_view::TreeView;
 use crate::bvh::traverse::triangle_leaf::ClosestTri;
 use crate::ray::{HitBlock, LANES, NO_HIT, RayBlock};
 use crate::shapes::Shape;
+use crate::stored_volume::StoredIsosurface;
 use fearless_simd::Simd;
 use std::cell::Cell;
 use std::marker::PhantomData;
@@ -23,8 +24,8 @@ use std::marker::PhantomData;
 /// A shape whose primitives take many rays at once.
 pub(super) trait PacketShape: Shape {
     /// At most sixteen blocks through primitive `prim`; lanes whose ranges are empty hit nothing. The
-    /// hits are those of [`Shape::closest`]; `hits` has none yet, and
-    /// gets any number of a primitive where there is one.
+    /// hits are those of [`Shape::closest`]. `hits` has none yet, and gets any number of a primitive
+    /// where there is one.
     fn trace<S: Simd, Q: HitQuery>(
         &self,
         simd: S,
@@ -51,6 +52,19 @@ pub(super) struct PacketRoom<'a> {
     pub(super) packet: &'a mut Packet,
     /// Gets where hit triangles lie in the primitive. It has none yet.
     pub(super) places: &'a mut [[TrianglePlace; LANES]],
+}
+
+impl PacketShape for StoredIsosurface {
+    fn trace<S: Simd, Q: HitQuery>(
+        &self,
+        simd: S,
+        prim: u32,
+        rays: &[RayBlock],
+        hits: &mut [HitBlock],
+        _: PacketRoom<'_>,
+    ) {
+        self.closest_of_blocks(simd, prim, rays, hits);
+    }
 }
 
 /// Per-thread buffers.

@@ -44,28 +44,45 @@ pub(crate) fn min_max(v: &[f32; 8]) -> (f32, f32) {
     v.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), &x| (l.min(x), h.max(x)))
 }
 
+/// Whether one corner is below `iso` and another is not, and all are finite. Without branches, so
+/// that the loop is vectorized.
+#[inline(always)]
+fn crosses(corners: &[f32; 8], iso: f32) -> bool {
+    let (mut below, mut above, mut finite) = (false, false, true);
+    for v in corners {
+        below |= *v < iso;
+        above |= *v >= iso;
+        finite &= v.is_finite();
+    }
+    below & above & finite
+}
+
 /// The first crossing of a surface in the cell with these values at its corners, x fastest. A cell
 /// with a corner that is not finite is empty.
-#[inline]
+#[inline(always)]
 pub(crate) fn root_in_cell(
     corners: &[f32; 8],
     isovalues: &[f32],
     ray: &IndexRay,
     crossing: &Crossing,
 ) -> Option<Root> {
-    let (lo, hi) = min_max(corners);
     let mut positions = None;
     let mut best: Option<(f64, usize)> = None;
     for (n, &iso) in isovalues.iter().enumerate() {
-        let crosses = lo < iso && iso <= hi && corners.iter().all(|v| v.is_finite());
-        if !crosses {
+        if !crosses(corners, iso) {
             continue;
         }
-        let (p, q) = positions.get_or_insert_with(|| ray.fractions(crossing, 1));
+        let (p, q) = positions.get_or_insert_with(
+            #[inline(always)]
+            || ray.fractions(crossing, 1),
+        );
         // Differences first: f32 values minus an f32 are exact in f64 unless 2²⁹ apart, so the sign
         // at grid points is right.
-        let iso = f64::from(iso);
-        let b = ray_cubic::along(&corners.map(|v| f64::from(v) - iso), p, q);
+        let (iso, mut above) = (f64::from(iso), [0.0; 8]);
+        for (above, v) in above.iter_mut().zip(corners) {
+            *above = f64::from(*v) - iso;
+        }
+        let b = ray_cubic::along(&above, p, q);
         // A ray that starts exactly on the surface touches it there, in any direction.
         let touches = crossing.entry.is_none() && b[0] == 0.0;
         if let Some(u) = if touches { Some(0.0) } else { ray_cubic::first_change(&b) }

@@ -68,6 +68,12 @@ impl ActiveCells {
         (self.bounds[0][0] < self.bounds[0][1]).then_some(self.bounds)
     }
 
+    /// The active cells of all blocks.
+    #[inline(always)]
+    pub(super) fn all(&self) -> &[u64; BLOCKS * BLOCKS * BLOCKS] {
+        &self.cells
+    }
+
     /// The active cells of block `number`, below 512.
     #[inline(always)]
     pub(super) fn in_block(&self, number: usize) -> u64 {

@@ -23,24 +23,33 @@ type Table<const N: usize> = [[f64; N]; 3];
 
 /// Where a ray stands.
 #[derive(Clone, Copy)]
-struct Place {
-    t0: f64,
+pub(super) struct Place {
+    pub(super) t0: f64,
     /// Axis of the face through which it came, or 3 where its range begins.
-    entry: usize,
+    pub(super) entry: usize,
 }
 
 /// A ray in a whole brick.
-struct BrickRay<'a> {
-    ray: &'a IndexRay,
-    t_max: f64,
-    /// The plane of the lattice that it meets first along each axis.
-    near: [i64; 3],
+pub(super) struct BrickRay<'a> {
+    pub(super) ray: &'a IndexRay,
+    pub(super) t_max: f64,
     /// 1 where it moves to higher cells, else -1.
-    sign: [i64; 3],
+    pub(super) sign: [i64; 3],
     /// Whether it moves along the axis at all. Where it does not, planes up to `still` lie behind
     /// it.
-    moves: [bool; 3],
-    still: [i64; 3],
+    pub(super) moves: [bool; 3],
+    pub(super) still: [i64; 3],
+}
+
+/// A block that a ray enters.
+pub(super) struct BlockVisit {
+    /// The plane of the lattice that the ray meets first along each axis.
+    pub(super) near: [i64; 3],
+    /// Parameters at the planes that it meets last.
+    pub(super) far: [f64; 3],
+    pub(super) place: Place,
+    /// Its active cells.
+    pub(super) cells: u64,
 }
 
 /// Visits the active cells that a ray crosses within `[t_min, t_max]`, in order, until `visit`
@@ -59,7 +68,9 @@ pub(super) fn walk_active(
     let Some(bounds) = active.bounds() else { return };
     // The first of the blocks around all active cells, and one past the last, in the ray's order.
     let (mut first, mut end) = ([0; 3], [0; 3]);
-    let mut way = BrickRay { ray, t_max, near: lo, sign: [1; 3], moves: [true; 3], still: [0; 3] };
+    // The plane of the lattice that it meets first along each axis.
+    let mut near = lo;
+    let mut way = BrickRay { ray, t_max, sign: [1; 3], moves: [true; 3], still: [0; 3] };
     for a in 0..3 {
         let [low, high] = [usize::from(bounds[a][0]), usize::from(bounds[a][1])];
         let turned = ray.d[a] < 0.0;
@@ -74,7 +85,7 @@ pub(super) fn walk_active(
             }
             (way.moves[a], way.still[a]) = (false, cell);
         } else if turned {
-            (way.near[a], way.sign[a]) = (lo[a] + edge, -1);
+            (near[a], way.sign[a]) = (lo[a] + edge, -1);
         }
     }
     // As in `IndexRay::walk`: of planes met at the same parameter, the last is the entry and the
@@ -85,11 +96,11 @@ pub(super) fn walk_active(
         if !way.moves[a] {
             continue;
         }
-        let plane = |k: usize| way.near[a] + way.sign[a] * (CELLS * k) as i64;
-        let near = ray.plane_at(a, plane(first[a]) as f64);
+        let plane = |k: usize| near[a] + way.sign[a] * (CELLS * k) as i64;
+        let low = ray.plane_at(a, plane(first[a]) as f64);
         let far = ray.plane_at(a, plane(end[a]) as f64);
-        if near >= enter {
-            (enter, entry) = (near, a);
+        if low >= enter {
+            (enter, entry) = (low, a);
         }
         if far < leave {
             (leave, exit) = (far, a);
@@ -105,7 +116,7 @@ pub(super) fn walk_active(
     };
     let mut planes: Table<16> = [[f64::INFINITY; 16]; 3];
     for a in 0..3 {
-        way.fill::<{ BLOCKS + 2 }>(a, 0, CELLS, &mut planes[a]);
+        way.fill::<{ BLOCKS + 2 }>(a, near[a], CELLS, &mut planes[a]);
     }
     // The number of the block, and what a step along each axis adds to it.
     let (mut at, mut step, mut next, mut k) = (0isize, [0isize; 3], [0f64; 3], [0usize; 3]);
@@ -126,8 +137,11 @@ pub(super) fn walk_active(
         let (a, leaves_at) = first_of(next);
         let ends = leaves_at > t_max;
         let cells = active.in_block(at as usize);
-        if cells != 0 && !way.walk_block(&planes, k, place, cells, &mut visit) {
-            return;
+        if cells != 0 {
+            let near = std::array::from_fn(|b| near[b] + way.sign[b] * (CELLS * k[b]) as i64);
+            if !way.walk_block(BlockVisit { near, far: next, place, cells }, &mut visit) {
+                return;
+            }
         }
         if ends {
             return;
@@ -174,11 +188,10 @@ fn planes_behind<const N: usize, const LAST: usize>(
 }
 
 impl BrickRay<'_> {
-    /// The parameters at `COUNT` planes along axis `a`, from plane `first` on with `step` between
-    /// them, counted from the one that the ray meets first.
+    /// The parameters at `COUNT` planes along axis `a`, from plane `near` on in the ray's order
+    /// with `step` between them.
     #[inline(always)]
-    fn fill<const COUNT: usize>(&self, a: usize, first: usize, step: usize, out: &mut [f64]) {
-        let near = self.near[a] + self.sign[a] * first as i64;
+    fn fill<const COUNT: usize>(&self, a: usize, near: i64, step: usize, out: &mut [f64]) {
         if !self.moves[a] {
             for (k, t) in out.iter_mut().take(COUNT).enumerate() {
                 let is_behind = near + (step * k) as i64 <= self.still[a];
@@ -193,22 +206,19 @@ impl BrickRay<'_> {
         }
     }
 
-    /// The cells `active` of the block `k`, in the ray's order. Returns whether to go on.
+    /// The active cells of a block, in the ray's order. Returns whether to go on.
     #[inline(always)]
-    fn walk_block(
+    pub(super) fn walk_block(
         &self,
-        blocks: &Table<16>,
-        k: [usize; 3],
-        mut place: Place,
-        active: u64,
+        BlockVisit { near, far, mut place, cells: active }: BlockVisit,
         visit: &mut impl FnMut(&Crossing) -> bool,
     ) -> bool {
         let mut planes: Table<8> = [[f64::INFINITY; 8]; 3];
         let (mut bit, mut step, mut next, mut c) = (0i32, [0i32; 3], [0f64; 3], [0usize; 3]);
         let mut stride = 1;
         for a in 0..3 {
-            self.fill::<CELLS>(a, CELLS * k[a], 1, &mut planes[a]);
-            planes[a][CELLS] = blocks[a][(k[a] + 1) & 15];
+            self.fill::<CELLS>(a, near[a], 1, &mut planes[a]);
+            planes[a][CELLS] = far[a];
             c[a] = planes_behind::<8, { CELLS - 1 }>(&planes, a, place);
             next[a] = planes[a][(c[a] + 1) & 7];
             step[a] = self.sign[a] as i32 * stride;
@@ -223,9 +233,8 @@ impl BrickRay<'_> {
             if active >> (bit & 63) & 1 == 1 {
                 let mut cell = [0; 3];
                 for b in 0..3 {
-                    let ahead = (CELLS * k[b] + c[b]) as i64;
                     let back = i64::from(self.sign[b] < 0);
-                    cell[b] = self.near[b] + self.sign[b] * ahead - back;
+                    cell[b] = near[b] + self.sign[b] * c[b] as i64 - back;
                 }
                 let crossing = Crossing {
                     cell,

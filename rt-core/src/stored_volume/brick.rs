@@ -180,9 +180,10 @@ impl StoredBrick {
         point.cmpge(self.place.lo).all() && point.cmple(self.place.hi).all()
     }
 
-    #[inline]
+    #[inline(always)]
     fn index(&self, point: UVec3) -> usize {
-        let [x, y, z] = (point - self.place.lo).to_array().map(|n| n as usize);
+        let UVec3 { x, y, z } = point - self.place.lo;
+        let (x, y, z) = (x as usize, y as usize, z as usize);
         (z * self.points[1] + y) * self.points[0] + x
     }
 
@@ -225,14 +226,20 @@ impl StoredBrick {
     }
 
     /// The values at the corners of a cell of this brick, x fastest.
-    #[inline]
+    #[inline(always)]
     pub(super) fn corners(&self, cell: UVec3) -> [f32; 8] {
         let i = self.index(cell);
         let (y, z) = (self.points[0], self.points[0] * self.points[1]);
         with_values!(&self.values, |v| {
             // One check for all of them.
             let v = &v[i..=i + z + y + 1];
-            [v[0], v[1], v[y], v[y + 1], v[z], v[z + 1], v[z + y], v[z + y + 1]].map(number)
+            let (low, high) =
+                ([v[0], v[1], v[y], v[y + 1]], [v[z], v[z + 1], v[z + y], v[z + y + 1]]);
+            let mut corners = [0.0; 8];
+            for k in 0..4 {
+                (corners[k], corners[4 + k]) = (number(low[k]), number(high[k]));
+            }
+            corners
         })
     }
 }

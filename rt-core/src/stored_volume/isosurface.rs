@@ -2,19 +2,22 @@
 
 use super::active_walk::walk_active;
 use super::brick::StoredBrick;
-use super::layout::BLOCK_CELLS;
+use super::layout::{BLOCK_CELLS, VolumeLayout};
+use super::ray_block::{IndexRays, walk_active_block};
 use super::read::StoredVolume;
 use crate::grid::{cell_of, gradient_in_cell};
 use crate::grid_walk::{Crossing, IndexRay};
 use crate::math::Aabb;
-use crate::ray::Ray;
+use crate::ray::{HitBlock, LANES, Ray, RayBlock};
 use crate::shapes::isosurface_cell::{
     Root, check_isovalues, place_on, root_in_cell, smooth_gradient, smooth_gradient_inside,
 };
 use crate::shapes::{
     IsosurfaceNormals, Shape, ShapeError, ShapeHit, ShapeSurface, in_range, outward_box,
 };
+use fearless_simd::Simd;
 use glam::{DVec3, UVec3, Vec3};
+use std::any::Any;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -69,6 +72,76 @@ impl StoredIsosurface {
         IndexRay::new(ray.origin.as_dvec3(), ray.dir.as_dvec3(), spacing)
     }
 
+    /// The first roots of blocks of rays in brick `prim`, of lanes whose ranges are not empty.
+    #[inline(always)]
+    pub(crate) fn closest_of_blocks<S: Simd>(
+        &self,
+        simd: S,
+        prim: u32,
+        rays: &[RayBlock],
+        hits: &mut [HitBlock],
+    ) {
+        let Some(&number) = self.bricks.get(prim as usize) else { return };
+        self.volume.with_brick(number, |brick| {
+            simd.vectorize(
+                #[inline(always)]
+                || {
+                    for (rays, hits) in rays.iter().zip(hits) {
+                        self.closest_of_block(brick, prim, rays, hits);
+                    }
+                },
+            );
+        });
+    }
+
+    #[inline(always)]
+    fn closest_of_block(
+        &self,
+        brick: &StoredBrick,
+        prim: u32,
+        rays: &RayBlock,
+        hits: &mut HitBlock,
+    ) {
+        let mut set = |lane: usize, root: Root| {
+            let t = root.t as f32;
+            if t >= rays.t_min[lane] && t < rays.t_max[lane] {
+                (hits.t[lane], hits.u[lane]) = (t, root.isovalue as f32);
+                (hits.v[lane], hits.prim[lane]) = (0.0, prim);
+            }
+        };
+        let mut left = 0u16;
+        for lane in 0..LANES {
+            left |= u16::from(rays.t_min[lane] < rays.t_max[lane]) << lane;
+        }
+        if let Some(active) = brick.active_cells(&self.isovalues, self.number) {
+            let index_rays = IndexRays::new(rays, self.volume.layout().spacing);
+            let together = left & index_rays.moving();
+            left &= !together;
+            let lo = brick.place.lo.to_array().map(i64::from);
+            let range = (&rays.t_min, &rays.t_max);
+            walk_active_block(&index_rays, together, lo, active, range, |lane, ray, crossing| {
+                let root = self.root_in(brick, ray, crossing);
+                let goes_on = root.is_none();
+                root.into_iter().for_each(|root| set(lane, root));
+                goes_on
+            });
+        }
+        while left != 0 {
+            let lane = left.trailing_zeros() as usize & (LANES - 1);
+            left &= left - 1;
+            if let Some(root) = self.first_in(brick, &rays.get(lane)) {
+                set(lane, root);
+            }
+        }
+    }
+
+    /// The first root in a cell of a brick.
+    #[inline(always)]
+    fn root_in(&self, brick: &StoredBrick, ray: &IndexRay, crossing: &Crossing) -> Option<Root> {
+        let cell = cell_in(brick, crossing.cell)?;
+        root_in_cell(&brick.corners(cell), &self.isovalues, ray, crossing)
+    }
+
     /// The first root in brick `prim` within the ray's range.
     fn first(&self, prim: u32, ray: &Ray) -> Option<Root> {
         let number = *self.bricks.get(prim as usize)?;
@@ -84,9 +157,7 @@ impl StoredIsosurface {
         let (t_min, t_max) = (f64::from(ray.t_min), f64::from(ray.t_max));
         let mut found = None;
         let mut look = |crossing: &Crossing| {
-            found = cell_in(brick, crossing.cell).and_then(|cell| {
-                root_in_cell(&brick.corners(cell), &self.isovalues, &index_ray, crossing)
-            });
+            found = self.root_in(brick, &index_ray, crossing);
             found.is_none()
         };
         if index_ray.is_plain()
@@ -112,6 +183,21 @@ impl StoredIsosurface {
             goes_on
         });
         found
+    }
+
+    /// As [`Self::first_in`], for a range of few cells: a walk through these alone has less to
+    /// prepare.
+    fn first_near(&self, brick: &StoredBrick, index_ray: &IndexRay, near: &Ray) -> Option<Root> {
+        let cells = |p: UVec3| p.to_array().map(i64::from);
+        let last = cells(self.volume.layout().dims - UVec3::ONE);
+        let (lo, hi) = (cells(brick.place.lo), cells(brick.place.hi));
+        let (t_min, t_max) = (f64::from(near.t_min), f64::from(near.t_max));
+        let mut found = None;
+        index_ray.walk(lo, hi, last, 1, t_min, t_max, |crossing| {
+            found = self.root_in(brick, index_ray, crossing);
+            found.is_none()
+        });
+        found.filter(|r| in_range(r.t as f32, near))
     }
 
     /// The gradient at a continuous index, in value per world unit.
@@ -145,11 +231,15 @@ fn crosses(isovalues: &[f32], [lo, hi]: [f32; 2]) -> bool {
 
 /// A cell of a brick. `None` where it lies outside: a ray whose numbers overflow in units of cells
 /// has no place in the lattice.
-#[inline]
+#[inline(always)]
 fn cell_in(brick: &StoredBrick, cell: [i64; 3]) -> Option<UVec3> {
-    let (lo, hi) = (brick.place.lo.to_array(), brick.place.hi.to_array());
-    let is_inside = (0..3).all(|a| i64::from(lo[a]) <= cell[a] && cell[a] < i64::from(hi[a]));
-    is_inside.then(|| UVec3::from_array(cell.map(|c| c as u32)))
+    let (lo, hi) = (brick.place.lo, brick.place.hi);
+    let mut is_inside = true;
+    for a in 0..3 {
+        is_inside &= i64::from(lo[a]) <= cell[a] && cell[a] < i64::from(hi[a]);
+    }
+    let [x, y, z] = cell;
+    if is_inside { Some(UVec3::new(x as u32, y as u32, z as u32)) } else { None }
 }
 
 impl Shape for StoredIsosurface {
@@ -174,16 +264,26 @@ impl Shape for StoredIsosurface {
     }
 
     fn surface(&self, prim: u32, hit: &ShapeHit, ray: &Ray) -> ShapeSurface {
-        let layout = self.volume.layout();
-        let place = place_on(&self.index_ray(ray), layout.dims, layout.spacing, hit, ray, |near| {
-            self.first(prim, near)
-        });
+        let VolumeLayout { dims, spacing, .. } = self.volume.layout();
+        let index_ray = self.index_ray(ray);
         let number = self.bricks.get(prim as usize).copied();
-        let at = place.index.as_vec3();
-        let gradient = number
-            .and_then(|number| self.volume.with_brick(number, |brick| self.gradient(brick, at)));
+        let in_brick = |brick: &StoredBrick| {
+            let again = |near: &Ray| self.first_near(brick, &index_ray, near);
+            let place = place_on(&index_ray, dims, spacing, hit, ray, again);
+            let gradient = self.gradient(brick, place.index.as_vec3());
+            (place, gradient)
+        };
+        let found = number.and_then(|number| self.volume.with_brick(number, in_brick));
+        let (place, gradient) = found.unwrap_or_else(|| {
+            // The brick could be read for the hit and cannot be read now: the render fails.
+            (place_on(&index_ray, dims, spacing, hit, ray, |_| None), Vec3::ZERO)
+        });
         let isovalue = self.isovalues[place.isovalue.min(self.isovalues.len() - 1)];
-        place.surface(gradient.unwrap_or(Vec3::ZERO), isovalue, ray)
+        place.surface(gradient, isovalue, ray)
+    }
+
+    fn as_any(&self) -> Option<&dyn Any> {
+        Some(self)
     }
 
     fn is_costly(&self) -> bool {

@@ -20,6 +20,7 @@ mod error;
 mod format;
 mod isosurface;
 mod layout;
+mod ray_block;
 mod read;
 #[cfg(test)]
 mod tests;

@@ -7,7 +7,7 @@ use crate::grid::Grid;
 use crate::math::SplitMix64;
 use crate::paging::PageSource;
 use crate::paging::fields::checksum;
-use crate::ray::Ray;
+use crate::ray::{HitBlock, LANES, Ray, RayBlock};
 use crate::shapes::{Isosurface, IsosurfaceNormals, IsosurfaceOptions, Shape, ShapeHit};
 use glam::{DAffine3, DVec3, UVec3, Vec3};
 use std::sync::{Arc, Mutex};
@@ -164,6 +164,60 @@ fn hits_are_those_of_the_lattice_in_memory_bit_for_bit_for_all_types_of_values()
             let hits = assert_same_hits(Arc::new(other), grid.clone(), normals, &rays[..1000]);
             assert!(hits > 50, "{of:?}: {hits} hits of another surface");
         }
+    }
+}
+
+#[test]
+fn blocks_and_packets_have_the_hits_of_single_rays_bit_for_bit() {
+    let of = ValueType::U8;
+    let (bytes, numbers) = values(of);
+    let (file, _) = store(layout(of), &bytes);
+    let size = ((DIMS - UVec3::ONE).as_dvec3() * layout(of).spacing).as_vec3();
+    // Pixels of images from outside and from within, and rays of all kinds.
+    let image = |eye: Vec3, width: f32| -> Vec<Ray> {
+        let pixel = |i: usize| {
+            let (x, y) = ((i / 256 % 4 * 16 + i % 16) as f32, (i / 1024 * 16 + i / 16 % 16) as f32);
+            let dir = Vec3::new(1.0, width * (x / 32.0 - 1.03), width * (y / 32.0 - 0.98));
+            let t_min = if i.is_multiple_of(7) { 2.0 } else { 0.0 };
+            Ray { t_min, ..Ray::new(eye, dir) }.with_t_max(if i.is_multiple_of(5) {
+                44.0
+            } else {
+                1e9
+            })
+        };
+        (0..4096).map(pixel).collect()
+    };
+    let (outside, within) = (Vec3::new(-6.0, 0.51, 0.49) * size, Vec3::new(0.1, 0.52, 0.47) * size);
+    let (outside, within, all) = (image(outside, 0.1), image(within, 1.0), rays(4096));
+    for (budget, shares) in [(usize::MAX, &[0.5][..]), (100_000, &[0.2, 0.7])] {
+        let volume = Arc::new(StoredVolume::open(file.clone(), budget).expect("sound bytes"));
+        let isovalues = isovalues(&numbers, shares);
+        let surface = StoredIsosurface::new(volume, &isovalues, IsosurfaceNormals::Smooth);
+        let world = world_of(Arc::new(surface.expect("isovalues")));
+        for (name, coherent, rays) in
+            [("outside", true, &outside), ("within", true, &within), ("scattered", false, &all)]
+        {
+            let blocks = RayBlock::from_rays(rays);
+            let mut found = vec![HitBlock::MISS; blocks.len()];
+            let mut blocked = vec![0; blocks.len()];
+            if coherent {
+                world.closest_coherent(&blocks, &mut found).expect("as many");
+                world.occluded_coherent(&blocks, &mut blocked).expect("as many");
+            } else {
+                world.closest_incoherent(&blocks, &mut found).expect("as many");
+                world.occluded_incoherent(&blocks, &mut blocked).expect("as many");
+            }
+            let mut hits = 0;
+            for (i, ray) in rays.iter().enumerate() {
+                let (block, lane) = (i / LANES, i % LANES);
+                let (hit, expected) = (found[block].get(lane), world.closest(ray));
+                assert_eq!(hit, expected, "{name}: {ray:?}");
+                assert_eq!(blocked[block] >> lane & 1 == 1, world.occluded(ray), "{ray:?}");
+                hits += u32::from(hit.is_some());
+            }
+            assert!(hits > 400, "{name}: {hits} hits");
+        }
+        assert_eq!(world.failure(), None);
     }
 }
 
