@@ -32,16 +32,15 @@
 //! what the lattice does, and lattices with an even number of nodes have no such half.)
 
 use crate::field::Field;
-use crate::interpolate::{BSpline, Interpolant, Lagrange};
+use crate::interpolate::{Interpolant, Lagrange};
 use crate::march::{
-    BlankCells, Deviational, FieldCache, Full, FullOptions, Options, Pefrl, Projection, Scheme,
-    Verlet,
+    BlankCells, Deviational, FieldCache, FieldInterpolant, Full, FullOfField, FullOptions, Options,
+    Pefrl, Projection, Scheme, Verlet,
 };
 use crate::path::{Exit, LightPaths, PathQuantities, Start, Status};
 use crate::view::View;
 use glam::DVec3;
 use mesh_error::largest_deflection;
-use std::sync::Arc;
 
 mod mesh_error;
 mod refine;
@@ -332,7 +331,8 @@ impl Plan {
                     blank,
                     ..FullOptions::default()
                 };
-                Box::new(FullSpline { field, spline: cache.spline(field), view, options })
+                let spline = FieldInterpolant::BSpline(cache.spline(field));
+                Box::new(FullOfField::new(field, spline, Pefrl, view, options))
             }
         }
     }
@@ -343,6 +343,17 @@ impl Plan {
         self.measure_with(field, view, rays, &FieldCache::default())
     }
 
+    /// The starts of about `rays` rays that are compared.
+    fn measured_starts(&self, field: &Field, view: View, rays: usize) -> Vec<Start> {
+        let mut starts = sample_starts(field.size_m(), field.centre_m(), &view, rays.max(1));
+        // Of a flow that is smooth but for the rounding of its values, no place is special.
+        let (r, h_m) = (self.derivative_bounds, DVec3::from(field.spacing_m()).min_element());
+        if r.fourth * h_m.powi(4) > ROUNDED_DIFFERENCE * r.eps {
+            starts.extend(starts_around(field, r.fourth_at, &view));
+        }
+        starts
+    }
+
     /// The starts of the rays that are compared, and this plan's error.
     fn sample(
         &self,
@@ -351,12 +362,7 @@ impl Plan {
         rays: usize,
         cache: &FieldCache,
     ) -> (Vec<Start>, MeasuredError) {
-        let mut starts = sample_starts(field.size_m(), field.centre_m(), &view, rays.max(1));
-        // Of a flow that is smooth but for the rounding of its values, no place is special.
-        let (r, h_m) = (self.derivative_bounds, DVec3::from(field.spacing_m()).min_element());
-        if r.fourth * h_m.powi(4) > ROUNDED_DIFFERENCE * r.eps {
-            starts.extend(starts_around(field, r.fourth_at, &view));
-        }
+        let starts = self.measured_starts(field, view, rays);
         let (max_rad, rms_rad, rays) = self.march_error(field, view, &starts, cache);
         let resolution_rad = self.resolution_error(field, view, &starts, cache);
         let mesh_rad = mesh_error::mesh_error(field, view, &starts);
@@ -373,6 +379,23 @@ impl Plan {
     ) -> MeasuredError {
         self.sample(field, view, rays, cache).1
     }
+
+    /// The error of the march of `paths`, which another device makes by this plan, in place of that
+    /// of the CPU's.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn measure_paths(
+        &self,
+        known: MeasuredError,
+        paths: &dyn LightPaths,
+        field: &Field,
+        rays: usize,
+        cache: &FieldCache,
+    ) -> MeasuredError {
+        let starts = self.measured_starts(field, *paths.view(), rays);
+        let (max_rad, rms_rad, rays) = self.error_of_paths(paths, field, &starts, cache);
+        MeasuredError { max_rad, rms_rad, rays, ..known }
+    }
+
     /// Largest and root mean square error of the march alone, and the number of rays compared.
     fn march_error(
         &self,
@@ -381,8 +404,19 @@ impl Plan {
         starts: &[Start],
         cache: &FieldCache,
     ) -> (f64, f64, usize) {
+        self.error_of_paths(&*self.paths_with(field, view, cache), field, starts, cache)
+    }
+
+    /// [`Plan::march_error`] of paths that are made elsewhere by this plan.
+    fn error_of_paths(
+        &self,
+        paths: &dyn LightPaths,
+        field: &Field,
+        starts: &[Start],
+        cache: &FieldCache,
+    ) -> (f64, f64, usize) {
         let mut planned = vec![Exit::UNDISTURBED; starts.len()];
-        self.paths_with(field, view, cache).trace_parallel(starts, &mut planned);
+        paths.trace_parallel(starts, &mut planned);
         let mut refined = planned.clone();
         let fine = Plan {
             mode: if self.mode == Mode::Full { Mode::Full } else { Mode::Paraxial },
@@ -391,7 +425,7 @@ impl Plan {
             request: Request { skip_rad: 0.0, ..self.request },
             ..*self
         };
-        fine.paths_with(field, view, cache).trace_parallel(starts, &mut refined);
+        fine.paths_with(field, *paths.view(), cache).trace_parallel(starts, &mut refined);
         compare(&planned, &refined)
     }
 
@@ -533,31 +567,5 @@ impl BoxPath {
     /// step times the change of slope, at most the longest path.
     fn edges_m(&self, h_m: f64) -> f64 {
         (0.25 * h_m * self.slope).min(self.longest_m)
-    }
-}
-
-/// A [`Full`] march that owns its spline.
-struct FullSpline<'a> {
-    field: &'a Field,
-    spline: Arc<BSpline>,
-    view: View,
-    options: FullOptions,
-}
-
-impl LightPaths for FullSpline<'_> {
-    fn trace(&self, starts: &[Start], exits: &mut [Exit]) {
-        Full::new(self.field, &*self.spline, Pefrl, self.view, self.options).trace(starts, exits);
-    }
-
-    fn view(&self) -> &View {
-        &self.view
-    }
-
-    fn quantities(&self) -> PathQuantities {
-        self.options.quantities
-    }
-
-    fn difference_step_m(&self) -> f64 {
-        0.5 * DVec3::from(self.field.spacing_m()).min_element()
     }
 }

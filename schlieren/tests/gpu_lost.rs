@@ -6,7 +6,7 @@ mod common;
 
 use common::{cube, difference, grid, lopsided, oblique, trace};
 use schlieren::field::Field;
-use schlieren::gpu::{Gpu, GpuOptions, GpuPaths};
+use schlieren::gpu::{Gpu, GpuOptions, GpuPaths, Method};
 use schlieren::interpolate::Interpolant;
 use schlieren::march::{Deviational, Options};
 use schlieren::path::LightPaths;
@@ -145,6 +145,27 @@ fn a_device_that_is_lost_again_and_again_is_given_up_by_name() {
             && warning.contains("the CPU traced the rest"),
         "{warning}"
     );
+}
+
+/// What the CPU traces in place of the device is the same march with the same interpolant.
+#[test]
+fn the_cpu_traces_the_rest_by_the_march_of_the_device() {
+    let Some(_) = gpu() else { return };
+    let field = cube(17, lopsided);
+    let starts = grid(16, 0.9);
+    for method in Method::ALL {
+        let options = GpuOptions { method, step_voxels: 0.83, ..GpuOptions::default() };
+        let interpolant = Interpolant::TrilinearGradient;
+        let own = Arc::new(Gpu::open().unwrap());
+        let paths = GpuPaths::new(own, &field, oblique(), interpolant, options).unwrap();
+        let expected = trace(&paths, &starts);
+        for _ in 0..4 {
+            paths.gpu().destroy();
+            let (_, max) = difference(&trace(&paths, &starts), &expected);
+            assert!(max < 2.0 * TOLERANCE, "{method:?}: {max:e}");
+        }
+        assert!(paths.counters().rays_on_cpu > 0, "{method:?}: {:?}", paths.counters());
+    }
 }
 
 /// A frame that was under way starts again on the reopened device, and its film has each photon

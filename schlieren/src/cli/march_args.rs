@@ -56,7 +56,7 @@ pub(super) struct MarchArgs {
     /// Largest error of a deflection: 1e-7rad, 0.1urad
     #[arg(long, value_name = "ANGLE", value_parser = units::angle_rad)]
     tolerance: Option<f64>,
-    /// Force a march: line-of-sight, verlet, ...
+    /// Force a march: line-of-sight, verlet, euler, pefrl, sharma, rk4
     #[arg(long, value_name = "NAME")]
     march: Option<String>,
     /// Force an interpolant: b-spline, trilinear, trilinear-gradient

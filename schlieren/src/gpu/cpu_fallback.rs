@@ -3,9 +3,13 @@
 //! accurate.
 
 use super::GpuError;
+use super::method::{GpuOptions, Method};
 use crate::field::Field;
 use crate::interpolate::Interpolant;
-use crate::march::{Deviational, Options};
+use crate::march::{
+    Deviational, FieldInterpolant, FullOfField, FullOptions, Integrator, Options, Pefrl,
+    RungeKutta4, Scheme, Sharma,
+};
 use crate::path::{Exit, LightPaths, Start};
 use crate::view::View;
 use std::sync::OnceLock;
@@ -72,16 +76,14 @@ impl<'a> CpuFallback<'a> {
         }
     }
 
-    /// The deviational march on the CPU through the same field.
+    /// The same march on the CPU through the same field.
     pub(super) fn of_march(
         field: &'a Field,
         view: View,
         interpolant: Interpolant,
-        options: Options,
+        options: GpuOptions,
     ) -> CpuFallback<'a> {
-        CpuFallback::new(move || {
-            Box::new(Deviational::on_this_thread(field, view, interpolant, options))
-        })
+        CpuFallback::new(move || march_on_this_thread(field, view, interpolant, options))
     }
 
     /// Number of rays that the CPU traced.
@@ -205,6 +207,39 @@ impl<'a> CpuFallback<'a> {
             cpu.trace(starts, exits);
         }
     }
+}
+
+/// The march on the CPU, made by the calling thread alone.
+fn march_on_this_thread<'a>(
+    field: &'a Field,
+    view: View,
+    interpolant: Interpolant,
+    options: GpuOptions,
+) -> Box<dyn LightPaths + Send + 'a> {
+    let GpuOptions { method, step_voxels, quantities, blank } = options;
+    let deviational = |scheme| -> Box<dyn LightPaths + Send + 'a> {
+        let options = Options { scheme, step_voxels, quantities, blank, ..Options::default() };
+        Box::new(Deviational::on_this_thread(field, view, interpolant, options))
+    };
+    match method {
+        Method::Verlet => deviational(Scheme::Verlet),
+        Method::Euler => deviational(Scheme::Euler),
+        Method::Pefrl => full(field, view, interpolant, options, Pefrl),
+        Method::Sharma => full(field, view, interpolant, options, Sharma),
+        Method::RungeKutta4 => full(field, view, interpolant, options, RungeKutta4),
+    }
+}
+
+fn full<'a, G: Integrator + Copy + Send + 'a>(
+    field: &'a Field,
+    view: View,
+    interpolant: Interpolant,
+    GpuOptions { step_voxels, quantities, blank, .. }: GpuOptions,
+    integrator: G,
+) -> Box<dyn LightPaths + Send + 'a> {
+    let interpolant = FieldInterpolant::on_this_thread(field, interpolant);
+    let options = FullOptions { step_voxels, quantities, blank, ..FullOptions::default() };
+    Box::new(FullOfField::new(field, interpolant, integrator, view, options))
 }
 
 #[cfg(test)]
@@ -427,7 +462,7 @@ mod tests {
                         field,
                         view,
                         Interpolant::BSpline,
-                        Options::default(),
+                        GpuOptions::default(),
                     );
                     let shared = shared.clone();
                     move |tile| {

@@ -1,6 +1,7 @@
 //! Assembles the shader for a scene from the WGSL files in this folder. It contains only what the
 //! scene needs.
 
+use super::Method;
 use crate::interpolate::Interpolant;
 
 /// First binding of the field's slabs. The bindings before it are parameters, rays, kernel outputs
@@ -36,7 +37,7 @@ impl FieldLayout {
 /// The features of a kernel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) struct Kernel {
-    /// [`Interpolant::BSpline`] or [`Interpolant::Trilinear`].
+    pub(super) method: Method,
     pub(super) interpolant: Interpolant,
     /// Whether it computes the optical path difference.
     pub(super) opd: bool,
@@ -47,14 +48,6 @@ pub(super) struct Kernel {
 }
 
 impl Kernel {
-    /// Number of layers of nodes that a slab holds beyond its cells.
-    pub(super) fn halo(interpolant: Interpolant) -> usize {
-        match interpolant {
-            Interpolant::BSpline => 3,
-            _ => 1,
-        }
-    }
-
     /// The source text of the shader that marches rays of the host.
     pub(super) fn of_rays(&self) -> String {
         self.march() + include_str!("rays.wgsl")
@@ -64,8 +57,18 @@ impl Kernel {
     pub(super) fn march(&self) -> String {
         // Only the B-spline is accurate enough to need compensated sums, as on the CPU.
         let spline = self.interpolant == Interpolant::BSpline;
-        let mut text = format!("const OPD = {};\nconst COMPENSATED = {spline};\n", self.opd);
+        let mut text = format!(
+            "const OPD = {};\nconst COMPENSATED = {spline};\nconst EULER = {};\n",
+            self.opd,
+            self.method == Method::Euler,
+        );
         text += include_str!("march.wgsl");
+        text += match self.method {
+            Method::Verlet | Method::Euler => include_str!("deviational.wgsl"),
+            Method::Pefrl => concat!(include_str!("full.wgsl"), include_str!("pefrl.wgsl")),
+            Method::Sharma => concat!(include_str!("full.wgsl"), include_str!("sharma.wgsl")),
+            Method::RungeKutta4 => concat!(include_str!("full.wgsl"), include_str!("rk4.wgsl")),
+        };
         text += if self.nodes {
             include_str!("nodes.wgsl")
         } else {
@@ -76,15 +79,16 @@ impl Kernel {
             text += "fn weighted(w: vec4f, v: vec4f) -> f32 {\n    return fma(w.w, v.w, fma(w.z, \
                      v.z, fma(w.y, v.y, w.x * v.x)));\n}\n";
         }
-        let source =
-            if spline { include_str!("bspline.wgsl") } else { include_str!("trilinear.wgsl") };
+        let source = match self.interpolant {
+            Interpolant::BSpline => include_str!("bspline.wgsl"),
+            Interpolant::Trilinear => include_str!("trilinear.wgsl"),
+            Interpolant::TrilinearGradient => include_str!("trilinear_gradient.wgsl"),
+        };
         let (values, origin) = match (self.layout, spline) {
             (FieldLayout::RowTexture, _) => (include_str!("bspline_row_texture.wgsl"), "vec3u"),
             (FieldLayout::RowBuffer, _) => (include_str!("bspline_row_buffer.wgsl"), "u32"),
             (FieldLayout::Slabs(_), true) => (include_str!("bspline_slab.wgsl"), "u32"),
-            (FieldLayout::Slabs(_), false) => {
-                ("@group(0) @binding(BINDING) var<storage, read> values_SLAB: array<f32>;\n", "u32")
-            }
+            (FieldLayout::Slabs(_), false) => ("", "u32"),
         };
         for slab in 0..self.layout.bindings() {
             let binding = (FIRST_SLAB + slab).to_string();
@@ -141,16 +145,23 @@ mod tests {
         FieldLayout::RowBuffer,
     ];
 
+    const METHODS: [Method; 5] = Method::ALL;
+    const INTERPOLANTS: [Interpolant; 3] =
+        [Interpolant::BSpline, Interpolant::Trilinear, Interpolant::TrilinearGradient];
+
     fn all() -> impl Iterator<Item = Kernel> {
         let of = |k: u32| Kernel {
-            interpolant: if k & 1 == 0 { Interpolant::BSpline } else { Interpolant::Trilinear },
-            opd: k & 2 != 0,
-            nodes: k & 4 != 0,
-            layout: LAYOUTS[(k >> 3) as usize],
+            method: METHODS[k as usize / 5 % METHODS.len()],
+            interpolant: INTERPOLANTS[k as usize / 5 / METHODS.len() % 3],
+            opd: (k / 15) as usize / METHODS.len() % 2 != 0,
+            nodes: (k / 30) as usize / METHODS.len() % 2 != 0,
+            layout: LAYOUTS[k as usize % 5],
         };
         // Rows are coefficients.
         let are_slabs = |k: &Kernel| matches!(k.layout, FieldLayout::Slabs(_));
-        (0..40).map(of).filter(move |k| are_slabs(k) || k.interpolant == Interpolant::BSpline)
+        (0..60 * METHODS.len() as u32)
+            .map(of)
+            .filter(move |k| are_slabs(k) || k.interpolant == Interpolant::BSpline)
     }
 
     fn parsed(wgsl: &str) -> naga::Module {

@@ -1,8 +1,8 @@
-// Integrates deviations from straight rays by position Verlet. This is the kernel of
-// march/packet.rs in WGSL, with the same order of operations.
+// What all marches of the device share: a ray, its deviation at the exit, and the lattice.
 //
-// The host adds `const OPD`, `node_kind` (from nodes.wgsl, or a constant), `sample` (from
-// trilinear.wgsl or bspline.wgsl), and an entry point: rays.wgsl, or those in frame/.
+// The host adds `const OPD`, `node_kind` (from nodes.wgsl, or a constant), `sample` (from the file
+// of an interpolant), `march_ray` (from deviational.wgsl or full.wgsl), and an entry point:
+// rays.wgsl, or those in frame/.
 
 struct Ray {
     // Midpoint of the undisturbed path through the field, in lattice coordinates.
@@ -25,8 +25,12 @@ struct KernelOutput {
     v: vec3f,
     opd: f32,
     xi: vec3f,
+    // The worst kind of node, and `TURNED_BIT`.
     worst_node: u32,
 }
+
+// Of a ray that never reaches its exit plane.
+const TURNED_BIT = 4u;
 
 struct Params {
     h2: vec3f,
@@ -73,83 +77,7 @@ fn rounded3(a: vec3f) -> vec3f {
     return bitcast<vec3f>(bitcast<vec3u>(a) ^ vec3u(params.zero));
 }
 
-fn march_ray(ray: Ray) -> KernelOutput {
-    var xi = ray.xi;
-    var v = vec3f(0.0);
-    var v_rest = vec3f(0.0);
-    var opd = 0.0;
-    var opd_rest = 0.0;
-    var worst_node = 0u;
-    if ray.steps == 0u {
-        return KernelOutput(v, opd, vec3f(0.0), worst_node);
-    }
-    // Step numbers are relative to the midpoint of the path, which makes them exact in f32.
-    let middle = 0.5 * f32(ray.steps);
-    var dt_whole = ray.dt;
-    var eps_at_entry = 0.0;
-
-    // Two more iterations than steps: one samples the entry, one ends in the exit plane. They are
-    // in the same loop so that there is one copy of the sampling code.
-    for (var n = 0u; n < ray.steps + 2u; n++) {
-        var number = f32(n) - 0.5 - middle;
-        var move_by = dt_whole;
-        var dt = dt_whole;
-        let entering = n == 0u;
-        let leaving = n == ray.steps + 1u;
-        if entering {
-            number = -middle;
-            move_by = 0.0;
-            dt = 0.0;
-        } else if leaving {
-            // tau is not depth: a ray that gained zeta in depth has passed its exit plane by zeta.
-            // One step back returns it there. Positions still lack the second half of the last
-            // step.
-            let missing = 0.5 * dt_whole;
-            let u_z = dot(ray.along, v);
-            let zeta = fma(missing, u_z, dot(ray.along, xi));
-            dt = -zeta / (u_z + eps_at_entry + 1.0);
-            number = fma(dt / dt_whole, 0.5, middle);
-            move_by = fma(dt, 0.5, missing);
-        }
-        xi = fma(vec3f(move_by), v, xi);
-        let at = fma(vec3f(number), ray.stride, ray.middle) + xi;
-        worst_node = max(worst_node, node_kind(at));
-        if worst_node > params.survives {
-            break;
-        }
-        let here = sample(at);
-        let eps = here.w;
-
-        // v += dt (1 + eps) g / h^2
-        let push = fma(dt, eps, dt) * params.rcp_h2;
-        let middle_v = fma(push * 0.5, here.xyz, v);
-        if COMPENSATED {
-            let term = fma(push, here.xyz, -v_rest);
-            let sum = rounded3(v + term);
-            v_rest = rounded3(sum - v) - term;
-            v = sum;
-        } else {
-            v = fma(push, here.xyz, v);
-        }
-        if OPD {
-            // (1+eps)^2 - w_z = eps (1 + eps) + u_t^2 / (1 + eps + w_z), with the mean of v before
-            // and after. All terms are small, and none is a difference.
-            let square = dot(middle_v * params.h2, middle_v);
-            let u_z = dot(middle_v, ray.along);
-            let transverse = square - u_z * u_z;
-            let more = fma(eps, eps, eps) + transverse / (eps + u_z + eps_at_entry + 2.0);
-            let term = fma(dt, more, -opd_rest);
-            let sum = rounded(opd + term);
-            opd_rest = rounded(sum - opd) - term;
-            opd = sum;
-        }
-        if entering {
-            eps_at_entry = eps;
-            // dt / (1 + eps), with the error of the division only on the small part.
-            dt_whole = dt_whole - dt_whole * (eps / (1.0 + eps));
-        } else if leaving {
-            xi = fma(vec3f(0.5 * dt), v, xi);
-        }
-    }
-    return KernelOutput(v, opd, xi, worst_node);
+// Comparisons with NaN may be left out by compilers.
+fn is_finite(a: f32) -> bool {
+    return (bitcast<u32>(a) & 0x7f800000u) != 0x7f800000u;
 }

@@ -10,6 +10,7 @@
 //! | file | contents |
 //! |---|---|
 //! | device.rs | [`Gpu`]: finds an adapter, opens it, knows its limits |
+//! | method.rs | how rays are stepped |
 //! | kernel.rs, *.wgsl | the shader, assembled from what a scene needs |
 //! | volume.rs, rows.rs | the field on the device: in slabs, or in rows of four coefficients |
 //! | part_size.rs | how many photons a device gets at a time |
@@ -17,13 +18,13 @@
 //! | frame/ | a whole frame on the device: starts, march, cut-off, film |
 //! | cpu_fallback.rs | recovery of batches that the device does not finish, on a reopened device or on the CPU |
 //!
-//! Line of sight, full marches and interpolated gradients have no kernel. They are refused by name
-//! ([`GpuError::Unsupported`]).
+//! Line of sight has no kernel. It is refused by name ([`GpuError::Unsupported`]).
 
 mod cpu_fallback;
 mod device;
 mod frame;
 mod kernel;
+mod method;
 mod part_size;
 mod paths;
 mod rows;
@@ -32,7 +33,8 @@ mod work;
 
 pub use device::Gpu;
 pub(crate) use frame::NotExposed;
-pub use paths::{GpuOptions, GpuPaths};
+pub use method::{GpuOptions, Method};
+pub use paths::GpuPaths;
 pub use volume::VolumeCache;
 pub use work::GpuCounters;
 
@@ -55,7 +57,9 @@ pub enum GpuError {
         reason: String,
     },
     /// There is no kernel for the request.
-    #[error("the GPU has no kernel for {what}; it has verlet with b-spline or trilinear. {cure}")]
+    #[error(
+        "the GPU has no kernel for {what}; it has verlet, euler, pefrl, sharma and rk4. {cure}"
+    )]
     Unsupported {
         /// What was requested.
         what: String,

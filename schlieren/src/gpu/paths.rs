@@ -3,13 +3,13 @@
 use super::cpu_fallback::{BatchTracer, CpuFallback, Failure};
 use super::device::MAX_REOPENINGS;
 use super::kernel::Kernel;
-use super::volume::{DeviceVolume, VolumeCache};
+use super::method::GpuOptions;
+use super::volume::{DeviceVolume, NodeValues, VolumeCache};
 use super::work::{GpuCounters, Work};
-
 use super::{Gpu, GpuError};
 use crate::field::Field;
-use crate::interpolate::{BSpline, Interpolant};
-use crate::march::{BlankCells, FieldCache, Frame, KernelOutput, KernelRay, Options};
+use crate::interpolate::Interpolant;
+use crate::march::{BlankCells, FieldCache, Frame, KernelOutput, KernelRay};
 use crate::path::{Exit, LightPaths, PathQuantities, Start};
 use crate::view::View;
 use bytemuck::{Pod, Zeroable};
@@ -21,31 +21,13 @@ use wgpu::{BufferDescriptor, BufferUsages};
 /// Number of rays per dispatch. This is enough to fill any device. It is small enough that two
 /// batches take little memory and no driver assumes that the device hangs.
 const BATCH: usize = 1 << 18;
+/// Bits of `KernelOutput::worst_node` of march.wgsl.
+const WORST_NODE: u32 = 3;
+const TURNED: u32 = 4;
 /// Workgroup size of march.wgsl.
 const WORKGROUP: usize = 64;
 
-/// Options of the march: the fields of [`Options`] that the GPU supports.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct GpuOptions {
-    /// Longest step, in lattice steps.
-    pub step_voxels: f64,
-    /// Quantities to compute besides deflection and displacement.
-    pub quantities: PathQuantities,
-    /// How cells without data treat light.
-    pub blank: BlankCells,
-}
-
-impl Default for GpuOptions {
-    fn default() -> Self {
-        GpuOptions {
-            step_voxels: 1.0,
-            quantities: PathQuantities::default(),
-            blank: BlankCells::Opaque,
-        }
-    }
-}
-
-/// Traces light on a GPU through a field of weak index. Every call costs a round trip to the
+/// Traces light on a GPU. Every call costs a round trip to the
 /// device, so [`LightPaths::trace_parallel`] with many starts is fastest.
 ///
 /// If the device fails during a call, it is reopened, at most a few times, and the lost rays are
@@ -95,6 +77,7 @@ impl DeviceState {
         options: GpuOptions,
     ) -> Result<DeviceState, GpuError> {
         let kernel = Kernel {
+            method: options.method,
             interpolant,
             opd: options.quantities.opd,
             nodes: volume.kinds.is_some(),
@@ -217,7 +200,7 @@ impl<'a> GpuPaths<'a> {
     /// Compiles the kernel and copies the field (or its spline) to the device.
     ///
     /// # Errors
-    /// If there is no kernel for the interpolant, or the field does not fit.
+    /// If the field does not fit, or the device fails.
     pub fn new(
         gpu: Arc<Gpu>,
         field: &'a Field,
@@ -242,26 +225,18 @@ impl<'a> GpuPaths<'a> {
         options: GpuOptions,
         caches: (&FieldCache, &VolumeCache),
     ) -> Result<GpuPaths<'a>, GpuError> {
-        if interpolant == Interpolant::TrilinearGradient {
-            return Err(GpuError::Unsupported {
-                what: "the interpolant trilinear-gradient".into(),
-                cure: "Take one of them, or compute on the CPU (--device cpu).",
-            });
-        }
         let (volume, bytes) = caches.1.volume(&gpu, field, interpolant, caches.0)?;
         let work = Work::default();
         work.add_to_device(bytes);
         let on_device = DeviceState::new(gpu, 0, volume, interpolant, options)?;
-        let GpuOptions { step_voxels, quantities, blank } = options;
-        let on_cpu = Options { step_voxels, quantities, blank, ..Options::default() };
         Ok(GpuPaths {
             field,
             frame: Frame::new(field, view),
             interpolant,
             options,
-            batch: BATCH,
+            batch: BATCH / options.method.samples(),
             current: Mutex::new(CurrentDevice { on_device: Arc::new(on_device), attempts: 0 }),
-            cpu_fallback_paths: CpuFallback::of_march(field, view, interpolant, on_cpu),
+            cpu_fallback_paths: CpuFallback::of_march(field, view, interpolant, options),
             work,
         })
     }
@@ -415,8 +390,13 @@ impl BatchTracer for GpuPaths<'_> {
             let outputs: &[RawKernelOutput] = bytemuck::cast_slice(&range);
             let read = |((exit, p), raw): ((&mut Exit, &KernelRay), &RawKernelOutput)| {
                 let opd = self.options.quantities.opd.then_some(raw.opd);
-                let output =
-                    KernelOutput { v: raw.v, xi: raw.xi, opd, worst_node: raw.worst_node as u8 };
+                let output = KernelOutput {
+                    v: raw.v,
+                    xi: raw.xi,
+                    opd,
+                    worst_node: (raw.worst_node & WORST_NODE) as u8,
+                    turned: raw.worst_node & TURNED != 0,
+                };
                 *exit = p.exit(&self.frame, self.field.n0(), self.options.blank, &output);
             };
             if parallel {
@@ -442,7 +422,8 @@ impl GpuPaths<'_> {
     /// Replaces the failed device: [`BatchTracer::replace`].
     pub(super) fn replace_device(&self, failed: &Failure) -> Result<(), GpuError> {
         // A thread that waits for this lock takes no other jobs. Nothing below may therefore wait
-        // for a job, so the spline is built on this thread alone.
+        // for a job, so what the interpolant reads is computed on this
+        // thread alone.
         let mut current = self.current.lock().unwrap_or_else(PoisonError::into_inner);
         if current.on_device.number != failed.device {
             return Ok(());
@@ -458,10 +439,9 @@ impl GpuPaths<'_> {
         let gpu = Arc::clone(gpu);
         current.attempts += 1;
         let gpu = gpu.current()?;
-        let spline =
-            (self.interpolant == Interpolant::BSpline).then(|| BSpline::on_this_thread(self.field));
+        let values = NodeValues::on_this_thread(self.field, self.interpolant);
         let number = failed.device + 1;
-        let volume = Arc::new(DeviceVolume::new(&gpu, self.field, spline.as_ref())?);
+        let volume = Arc::new(DeviceVolume::new(&gpu, self.field, &values)?);
         self.work.add_to_device(volume.bytes);
         let made = DeviceState::new(gpu, number, volume, self.interpolant, self.options)?;
         current.on_device = Arc::new(made);

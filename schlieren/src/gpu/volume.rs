@@ -2,11 +2,11 @@
 //! that fit a binding.
 
 use super::device::UPLOAD_BYTES;
-use super::kernel::{FIRST_SLAB, FieldLayout, Kernel};
+use super::kernel::{FIRST_SLAB, FieldLayout};
 use super::rows::{self, Rows};
 use super::{Gpu, GpuError};
 use crate::field::Field;
-use crate::interpolate::{BSpline, Interpolant};
+use crate::interpolate::{BSpline, Interpolant, TrilinearGradient};
 use crate::march::FieldCache;
 use std::sync::{Arc, Mutex, PoisonError};
 use wgpu::{BufferDescriptor, BufferUsages};
@@ -43,12 +43,68 @@ impl VolumeCache {
             return Ok((Arc::clone(&kept.volume), 0));
         }
         // No lock is held meanwhile: all threads take part in the spline.
-        let spline = (interpolant == Interpolant::BSpline).then(|| cache.spline(field));
-        let volume = Arc::new(DeviceVolume::new(gpu, field, spline.as_deref())?);
+        let values = match interpolant {
+            Interpolant::BSpline => NodeValues::BSpline(cache.spline(field)),
+            Interpolant::Trilinear => NodeValues::Trilinear,
+            Interpolant::TrilinearGradient => {
+                NodeValues::TrilinearGradient(TrilinearGradient::new(field))
+            }
+        };
+        let volume = Arc::new(DeviceVolume::new(gpu, field, &values)?);
         let (gpu, kept) = (Arc::clone(gpu), Arc::clone(&volume));
         *lock() = Some(Kept { gpu, interpolant, volume: kept });
         let bytes = volume.bytes;
         Ok((volume, bytes))
+    }
+}
+
+/// What an interpolant reads at the nodes of a field.
+pub(super) enum NodeValues {
+    /// Coefficients.
+    BSpline(Arc<BSpline>),
+    /// The field's own values.
+    Trilinear,
+    /// Central differences and eps.
+    TrilinearGradient(TrilinearGradient),
+}
+
+impl NodeValues {
+    /// Computed by the calling thread alone, which waits for no other thread.
+    pub(super) fn on_this_thread(field: &Field, interpolant: Interpolant) -> NodeValues {
+        match interpolant {
+            Interpolant::BSpline => NodeValues::BSpline(Arc::new(BSpline::on_this_thread(field))),
+            Interpolant::Trilinear => NodeValues::Trilinear,
+            Interpolant::TrilinearGradient => {
+                NodeValues::TrilinearGradient(TrilinearGradient::on_this_thread(field))
+            }
+        }
+    }
+
+    /// The numbers, how many of them a node has, and the strides of neighbours along y and z, in
+    /// nodes.
+    fn numbers<'a>(&'a self, field: &'a Field) -> (&'a [f32], usize, [usize; 2]) {
+        match self {
+            NodeValues::BSpline(spline) => {
+                let (coefficients, stride) = spline.coefficients();
+                (coefficients, 1, stride)
+            }
+            NodeValues::Trilinear => {
+                let [nx, ny, _] = field.dims();
+                (field.eps(), 1, [nx, nx * ny])
+            }
+            NodeValues::TrilinearGradient(gradient) => {
+                let (nodes, stride) = gradient.nodes();
+                (nodes, 4, stride)
+            }
+        }
+    }
+
+    /// Number of layers of nodes that a slab holds beyond its cells.
+    fn halo(&self) -> usize {
+        match self {
+            NodeValues::BSpline(_) => 3,
+            NodeValues::Trilinear | NodeValues::TrilinearGradient(_) => 1,
+        }
     }
 }
 
@@ -99,19 +155,16 @@ pub(super) struct DeviceVolume {
 }
 
 impl DeviceVolume {
-    /// Uploads the field, or the spline through it.
+    /// Uploads what an interpolant of the field reads.
     pub(super) fn new(
         gpu: &Gpu,
         field: &Field,
-        spline: Option<&BSpline>,
+        values: &NodeValues,
     ) -> Result<DeviceVolume, GpuError> {
         let [nx, ny, nz] = field.dims();
-        let (values, stride) = spline.map_or((field.eps(), [nx, nx * ny]), BSpline::coefficients);
-        let halo = Kernel::halo(if spline.is_some() {
-            Interpolant::BSpline
-        } else {
-            Interpolant::Trilinear
-        });
+        let is_spline = matches!(values, NodeValues::BSpline(_));
+        let halo = values.halo();
+        let (values, per_node, stride) = values.numbers(field);
         let too_large = |what, need, available| GpuError::TooLarge {
             what,
             dims: field.dims(),
@@ -128,15 +181,14 @@ impl DeviceVolume {
         }
         let kinds = words.map(|w| upload(gpu, bytemuck::cast_slice(&w))).transpose()?;
         let of_kinds = kinds.as_ref().map_or(0, wgpu::Buffer::size);
-        if spline.is_some()
-            && let Some(rows) = rows::upload(gpu, values, [nx + 2, ny + 2, nz + 2])?
-        {
+        if is_spline && let Some(rows) = rows::upload(gpu, values, [nx + 2, ny + 2, nz + 2])? {
             let (rows, stride, of_rows) = rows;
             let (values, bytes) = (Values::Rows(rows), of_kinds + of_rows);
             return Ok(DeviceVolume { values, kinds, stride, layers: nz - 1, bytes });
         }
+        let layer = per_node * stride[1];
         let Some((count, layers)) =
-            cut(nz - 1, halo, 4 * stride[1] as u64, gpu.binding_bytes(), gpu.slabs())
+            cut(nz - 1, halo, (4 * layer) as u64, gpu.binding_bytes(), gpu.slabs())
         else {
             let need = bytes_of(size_of_val(values) as u64);
             let available =
@@ -147,7 +199,7 @@ impl DeviceVolume {
             .map(|s| {
                 let first = s * layers;
                 let last = (first + layers).min(nz - 1) + halo;
-                upload(gpu, bytemuck::cast_slice(&values[first * stride[1]..last * stride[1]]))
+                upload(gpu, bytemuck::cast_slice(&values[first * layer..last * layer]))
             })
             .collect::<Result<Vec<_>, _>>()?;
         let bytes = of_kinds + slabs.iter().map(wgpu::Buffer::size).sum::<u64>();

@@ -24,11 +24,25 @@ pub struct TrilinearGradient {
 impl TrilinearGradient {
     /// Computes central differences, and one-sided ones of second order at the faces, in parallel.
     pub fn new(field: &Field) -> TrilinearGradient {
+        TrilinearGradient::in_jobs_of(field, 1)
+    }
+
+    /// [`TrilinearGradient::new`] on the calling thread alone, which waits for no other thread.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn on_this_thread(field: &Field) -> TrilinearGradient {
+        // Rayon does not divide ranges that are shorter than this minimum, and an undivided range
+        // runs on the calling thread.
+        TrilinearGradient::in_jobs_of(field, usize::MAX)
+    }
+
+    /// [`TrilinearGradient::new`] in rayon jobs of at least `least` rows.
+    fn in_jobs_of(field: &Field, least: usize) -> TrilinearGradient {
         let [nx, ny, nz] = field.dims();
         let row = padded_row(nx);
         let eps = field.eps();
         let mut nodes = vec![0.0f32; 4 * row * ny * nz];
-        nodes.par_chunks_exact_mut(4 * row).enumerate().for_each(|(r, out)| {
+        let rows = nodes.par_chunks_exact_mut(4 * row).with_min_len(least);
+        rows.enumerate().for_each(|(r, out)| {
             let (j, k) = (r % ny, r / ny);
             for (i, node) in out.chunks_exact_mut(4).take(nx).enumerate() {
                 let o = i + (j + k * ny) * nx;
@@ -39,6 +53,12 @@ impl TrilinearGradient {
             }
         });
         TrilinearGradient { nodes, dims: [nx, ny, nz], stride: [row, row * ny] }
+    }
+
+    /// Four numbers for each node, and the strides along y and z, in nodes.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn nodes(&self) -> (&[f32], [usize; 2]) {
+        (&self.nodes, self.stride)
     }
 
     pub(crate) fn rows(&self) -> TrilinearGradientRows<'_> {

@@ -2,6 +2,7 @@
 //! or with Euler for comparison with the dissertation.
 
 use super::field_cache::FieldCache;
+use super::field_interpolant::FieldInterpolant;
 use super::frame::{BlankCells, Frame};
 use super::kernel_ray::{KernelOutput, KernelRay};
 use super::packet::{
@@ -10,9 +11,7 @@ use super::packet::{
 };
 use crate::at_level;
 use crate::field::Field;
-use crate::interpolate::{
-    BSpline, Interpolant, Interpolate, Interpolate16, LANES, Trilinear, TrilinearGradient,
-};
+use crate::interpolate::{BSpline, Interpolant, Interpolate, Interpolate16, LANES};
 use crate::path::{Exit, LightPaths, PathQuantities, SkipReport, Start};
 use crate::skip::Bricks;
 use crate::view::View;
@@ -81,12 +80,6 @@ pub struct Counters {
     pub skipped_femtorad: u64,
 }
 
-enum FieldInterpolant<'a> {
-    BSpline(Arc<BSpline>),
-    Trilinear(Trilinear<'a>),
-    TrilinearGradient(TrilinearGradient),
-}
-
 /// Light paths through a field of weak index, computed as deviations from straight rays.
 pub struct Deviational<'a> {
     field: &'a Field,
@@ -121,7 +114,8 @@ impl<'a> Deviational<'a> {
         options: Options,
         level: Level,
     ) -> Deviational<'a> {
-        Self::build(field, view, interpolant, options, level, &|| Arc::new(BSpline::new(field)))
+        let interpolant = FieldInterpolant::new(field, interpolant);
+        Self::build(field, view, interpolant, options, level, || Arc::new(BSpline::new(field)))
     }
 
     /// [`Deviational::new`] with the spline through this field from a cache.
@@ -132,7 +126,8 @@ impl<'a> Deviational<'a> {
         options: Options,
         cache: &FieldCache,
     ) -> Deviational<'a> {
-        Self::build(field, view, interpolant, options, Level::new(), &|| cache.spline(field))
+        let interpolant = FieldInterpolant::with_cache(field, interpolant, cache);
+        Self::build(field, view, interpolant, options, Level::new(), || cache.spline(field))
     }
 
     /// [`Deviational::new`] on the calling thread alone, which waits for no other thread.
@@ -143,34 +138,25 @@ impl<'a> Deviational<'a> {
         interpolant: Interpolant,
         options: Options,
     ) -> Deviational<'a> {
-        debug_assert!(
-            options.skip_rad == 0.0 && interpolant != Interpolant::TrilinearGradient,
-            "bricks and gradients are made by all threads"
-        );
+        debug_assert!(options.skip_rad == 0.0, "bricks are made by all threads");
+        let interpolant = FieldInterpolant::on_this_thread(field, interpolant);
         let spline = || Arc::new(BSpline::on_this_thread(field));
-        Self::build(field, view, interpolant, options, Level::new(), &spline)
+        Self::build(field, view, interpolant, options, Level::new(), spline)
     }
 
+    /// `spline` is used for the bounds of bricks, if there is no other.
     fn build(
         field: &'a Field,
         view: View,
-        interpolant: Interpolant,
+        field_interpolant: FieldInterpolant<'a>,
         options: Options,
         level: Level,
-        spline: &dyn Fn() -> Arc<BSpline>,
+        spline: impl FnOnce() -> Arc<BSpline>,
     ) -> Deviational<'a> {
-        let (field_interpolant, of_bricks) = match interpolant {
-            Interpolant::BSpline => {
-                let s = spline();
-                (FieldInterpolant::BSpline(s.clone()), Some(s))
-            }
-            Interpolant::Trilinear => (FieldInterpolant::Trilinear(Trilinear::new(field)), None),
-            Interpolant::TrilinearGradient => {
-                (FieldInterpolant::TrilinearGradient(TrilinearGradient::new(field)), None)
-            }
-        };
-        let bricks =
-            (options.skip_rad > 0.0).then(|| Bricks::new(field, &of_bricks.unwrap_or_else(spline)));
+        let bricks = (options.skip_rad > 0.0).then(|| match &field_interpolant {
+            FieldInterpolant::BSpline(s) => Bricks::new(field, s),
+            _ => Bricks::new(field, &spline()),
+        });
         Deviational {
             field,
             frame: Frame::new(field, view),
@@ -205,21 +191,13 @@ impl<'a> Deviational<'a> {
 
     /// Memory in bytes, without the field.
     pub fn memory_bytes(&self) -> usize {
-        let interpolant = match &self.field_interpolant {
-            FieldInterpolant::BSpline(s) => s.memory_bytes(),
-            FieldInterpolant::Trilinear(s) => s.memory_bytes(),
-            FieldInterpolant::TrilinearGradient(s) => s.memory_bytes(),
-        };
+        let interpolant = self.interpolate().memory_bytes();
         interpolant + self.bricks.as_ref().map_or(0, Bricks::memory_bytes)
     }
 
     /// The interpolant in `f64`, for the reference integrators.
     pub fn interpolate(&self) -> &dyn Interpolate {
-        match &self.field_interpolant {
-            FieldInterpolant::BSpline(s) => &**s,
-            FieldInterpolant::Trilinear(s) => s,
-            FieldInterpolant::TrilinearGradient(s) => s,
-        }
+        self.field_interpolant.as_dyn()
     }
 
     /// Selects the kernel with only the features that this march needs.
@@ -317,6 +295,7 @@ impl<'a> Deviational<'a> {
                     xi: [0, 1, 2].map(|c| p.xi[c][l]),
                     opd: self.options.quantities.opd.then_some(p.opd[l]),
                     worst_node: p.worst_node[l],
+                    turned: false,
                 };
                 *exit = rays[i].exit(&self.frame, self.field.n0(), self.options.blank, &output);
             }

@@ -3,6 +3,7 @@
 
 use super::frame::{BlankCells, Frame};
 use super::integrator::{Integrator, InterpolatedMedium, Ray};
+use super::kernel_ray::steps_of;
 use crate::field::{Field, Node};
 use crate::interpolate::Interpolate;
 use crate::path::{Exit, LightPaths, PathQuantities, Start, Status};
@@ -75,8 +76,8 @@ impl<'a, I: Interpolate, G: Integrator> Full<'a, I, G> {
         let begin = Ray::inside(&medium, at_m + direction * near_m, direction);
         let length_m = far_m - near_m;
         let speed = self.frame.lattice_speed_per_m(direction);
-        let steps = (length_m * speed / self.options.step_voxels).ceil().max(1.0);
-        let dtau_m = length_m / steps;
+        let steps = steps_of(length_m * speed / self.options.step_voxels).max(1);
+        let dtau_m = length_m / f64::from(steps);
 
         // A ray is outside beyond the exit plane, or a voxel beyond a face: rays along a face thus
         // stay inside.
@@ -88,7 +89,7 @@ impl<'a, I: Interpolate, G: Integrator> Full<'a, I, G> {
             let beyond = (-p).max(p - self.frame.last).max_element() - margin;
             (r.depth_m() - length_m).max(beyond * smallest_m)
         };
-        let step_limit = self.options.step_limit_factor.saturating_mul(steps as u32).max(1);
+        let step_limit = self.options.step_limit_factor.saturating_mul(steps).max(1);
         let end = match self.field.nodes() {
             None => self.integrator.run_until(&medium, &begin, dtau_m, step_limit, outside),
             Some(kinds) => {

@@ -2,7 +2,7 @@
 //! `f64`. The kernels of the CPU and of the GPU share it.
 
 use super::frame::{BlankCells, Frame};
-use crate::path::{Exit, Start};
+use crate::path::{Exit, Start, Status};
 use glam::DVec3;
 
 /// The undisturbed ray of a start, with the rounding errors of its kernel input.
@@ -51,6 +51,9 @@ pub(crate) struct KernelOutput {
     pub(crate) opd: Option<f32>,
     /// The worst [`crate::field::Node`] that the ray encountered.
     pub(crate) worst_node: u8,
+    /// Whether the ray never reaches its exit plane. `xi` then also has the way back from that
+    /// plane.
+    pub(crate) turned: bool,
 }
 
 impl KernelRay {
@@ -125,12 +128,18 @@ impl KernelRay {
         } else {
             DVec3::ZERO
         };
-        let (transmission, status) = blank.outcome(output.worst_node);
+        let (mut transmission, mut status) = blank.outcome(output.worst_node);
+        let mut exit_depth_m = self.exit_depth_m;
+        if output.turned {
+            transmission = 0.0;
+            status = if status == Status::Free { Status::Turned } else { status };
+            exit_depth_m += xi.dot(self.beam[2]);
+        }
         let opd_m = |opd: f32| (f64::from(opd) * self.scale * frame.unit_m * n0) as f32;
         Exit {
             deflection_rad: [u.dot(right) as f32, u.dot(up) as f32],
             displacement_m: [xi.dot(right) as f32, xi.dot(up) as f32],
-            exit_depth_m: self.exit_depth_m as f32,
+            exit_depth_m: exit_depth_m as f32,
             opd_m: output.opd.map_or(f32::NAN, opd_m),
             transmission,
             status,

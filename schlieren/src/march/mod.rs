@@ -19,8 +19,10 @@ mod cell_exact;
 mod deviational;
 mod euler;
 mod field_cache;
+mod field_interpolant;
 mod frame;
 mod full;
+mod full_of_field;
 mod in_bricks;
 mod integrator;
 mod kernel_ray;
@@ -37,9 +39,11 @@ pub use cell_exact::{CellExact, LineIntegrals, Points};
 pub use deviational::{Counters, Deviational, Options, Scheme};
 pub use euler::Euler;
 pub use field_cache::{FieldCache, Projection};
+pub(crate) use field_interpolant::FieldInterpolant;
 pub use frame::BlankCells;
 pub(crate) use frame::Frame;
 pub use full::{Full, FullOptions};
+pub(crate) use full_of_field::FullOfField;
 pub use in_bricks::{
     Brick, InBricks, InBricksError, Lattice, Progress, RayState, Stencil, Undisturbed,
 };

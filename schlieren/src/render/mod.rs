@@ -23,6 +23,8 @@
 
 mod accuracy_warning;
 mod apparent;
+#[cfg(feature = "gpu")]
+mod device_march;
 mod device_work;
 mod expose;
 pub(crate) mod map;

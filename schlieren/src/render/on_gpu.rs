@@ -1,8 +1,10 @@
 //! Plans light paths on the GPU, or gives the reason why the CPU computes them.
 
+#[cfg(feature = "gpu")]
+use super::device_march::{self, DeviceMarch};
 use super::planned::PlannedPaths;
 #[cfg(feature = "gpu")]
-use super::planned::{Choice, described};
+use super::planned::described;
 use super::section::Caches;
 use super::{RenderError, Report};
 use crate::field::Field;
@@ -24,26 +26,11 @@ pub fn check_gpu(march: &MarchSpec) -> Result<(), RenderError> {
         return Ok(());
     }
     #[cfg(feature = "gpu")]
-    return unsupported(march)
+    return device_march::unsupported(march)
         .map_or_else(|| crate::gpu::Gpu::shared().map(|_| ()), Err)
         .map_err(RenderError::Gpu);
     #[cfg(not(feature = "gpu"))]
     Err(RenderError::NoGpu)
-}
-
-#[cfg(feature = "gpu")]
-const CURE: &str = "Omit --march, --interpolant or --skip, or compute on the CPU (--device cpu).";
-
-/// The error for options that a scene names but that have no kernel.
-#[cfg(feature = "gpu")]
-fn unsupported(march: &MarchSpec) -> Option<crate::gpu::GpuError> {
-    let what = match (march.method.as_deref(), march.interpolant.as_deref()) {
-        (Some(m), _) if m != "verlet" => format!("the march {m}"),
-        (_, Some("trilinear-gradient")) => "the interpolant trilinear-gradient".into(),
-        _ if march.skip_rad > 0.0 => "skipping uniform gas (march.skip_rad)".into(),
-        _ => return None,
-    };
-    Some(crate::gpu::GpuError::Unsupported { what, cure: CURE })
 }
 
 /// The reason why the CPU computes in place of the GPU. When a GPU was requested, causes that are
@@ -93,15 +80,8 @@ pub(super) fn on_gpu<'a>(
         );
     }
     let made = (|| {
-        if let Some(e) = unsupported(march) {
+        if let Some(e) = device_march::unsupported(march) {
             return Err(e);
-        }
-        if plan.mode != Mode::Paraxial {
-            return Err(GpuError::Unsupported {
-                what: "the full march (pefrl), which an index as strong as this flow's needs"
-                    .into(),
-                cure: "Compute on the CPU (--device cpu), or force --march verlet.",
-            });
         }
         let mut gpu = Gpu::shared()?;
         if march.device == Device::Auto && gpu.is_software() {
@@ -110,18 +90,10 @@ pub(super) fn on_gpu<'a>(
                 gpu.name()
             )));
         }
-        // The error is measured with the CPU's march, which agrees within rounding. Only steps and
-        // interpolant can be refined: the GPU has one march.
-        let here = Plan { request: Request { mode: Some(plan.mode), ..plan.request }, ..plan };
-        let (plan, achieved) = match measured_rays {
-            None => (plan, None),
-            Some(rays) => {
-                let (refined, error) = here.within_tolerance(field, view, rays, cache);
-                (Plan { request, ..refined }, Some(error))
-            }
-        };
+        let mut chosen = DeviceMarch::new(march, plan, field, view, measured_rays, cache);
         let options = GpuOptions {
-            step_voxels: plan.step_voxels,
+            method: chosen.method,
+            step_voxels: chosen.step_voxels,
             quantities: request.quantities,
             blank: request.blank,
         };
@@ -131,7 +103,7 @@ pub(super) fn on_gpu<'a>(
         let paths = loop {
             let on = Arc::clone(&gpu);
             let kept = (cache, &caches.device);
-            match GpuPaths::with_caches(on, field, view, plan.interpolant, options, kept) {
+            match GpuPaths::with_caches(on, field, view, chosen.interpolant, options, kept) {
                 Err(e @ GpuError::Failed { .. }) if gpu.failure().is_some() => {
                     warning.get_or_insert(format!(
                         "{}; it was reopened",
@@ -142,20 +114,24 @@ pub(super) fn on_gpu<'a>(
                 made => break made?,
             }
         };
-        Ok((paths, gpu, warning, plan, achieved))
+        if let Some(rays) = measured_rays {
+            chosen.measure(&paths, field, rays, cache);
+        }
+        Ok((paths, gpu, warning, chosen))
     })();
     match made {
-        Ok((paths, gpu, warning, plan, achieved)) => {
-            let description = described("verlet", plan.interpolant, plan.step_voxels);
+        Ok((paths, gpu, warning, chosen)) => {
+            let DeviceMarch { name, interpolant, step_voxels, bend, achieved, .. } = chosen;
+            let description = described(name, interpolant, step_voxels);
             let paths = Arc::new(paths);
             let mut planned = PlannedPaths::new(
                 Box::new(Arc::clone(&paths)),
                 format!("{description}, on {}", gpu.name()),
                 achieved,
                 &request,
-                (Mode::Paraxial.into(), plan.step_voxels),
+                (bend, step_voxels),
             );
-            planned.choice = Some(Choice::Lattice(plan));
+            planned.choice = chosen.choice();
             planned.on_device = Some(paths);
             if request.mode.is_none()
                 && achieved.is_some_and(|a| {

@@ -8,13 +8,13 @@ use super::planned::{Choice, PlannedPaths, described};
 use super::section::Caches;
 use super::{RenderError, TestSection};
 use crate::field::Field;
-use crate::interpolate::{BSpline, Interpolant, Interpolate, Trilinear, TrilinearGradient};
+use crate::interpolate::Interpolant;
 use crate::march::{
-    BlankCells, Deviational, Full, FullOptions, Integrator, Options, Pefrl, RungeKutta4, Scheme,
-    Sharma,
+    BlankCells, Deviational, FieldInterpolant, FullOfField, FullOptions, Integrator, Options,
+    Pefrl, RungeKutta4, Scheme, Sharma,
 };
 use crate::media::Bend;
-use crate::path::{Exit, LightPaths, PathQuantities, Start};
+use crate::path::{LightPaths, PathQuantities};
 use crate::plan::{Mode, Plan, Request};
 use crate::scene::{Device, Scene};
 use crate::technique::bos::ReversedPaths;
@@ -259,56 +259,6 @@ fn full<'a, G: Integrator + Copy + 'a>(
     integrator: G,
     options: FullOptions,
 ) -> Box<dyn LightPaths + 'a> {
-    match interpolant {
-        Interpolant::BSpline => Box::new(OwnedFull {
-            field,
-            interpolate: BSpline::new(field),
-            integrator,
-            view,
-            options,
-        }),
-        Interpolant::Trilinear => Box::new(OwnedFull {
-            field,
-            interpolate: Trilinear::new(field),
-            integrator,
-            view,
-            options,
-        }),
-        Interpolant::TrilinearGradient => Box::new(OwnedFull {
-            field,
-            interpolate: TrilinearGradient::new(field),
-            integrator,
-            view,
-            options,
-        }),
-    }
-}
-
-/// [`Full`] together with the interpolant that it borrows.
-struct OwnedFull<'a, I, G> {
-    field: &'a Field,
-    interpolate: I,
-    integrator: G,
-    view: View,
-    options: FullOptions,
-}
-
-impl<I: Interpolate, G: Integrator + Copy> LightPaths for OwnedFull<'_, I, G> {
-    fn trace(&self, starts: &[Start], exits: &mut [Exit]) {
-        Full::new(self.field, &self.interpolate, self.integrator, self.view, self.options)
-            .trace(starts, exits);
-    }
-
-    fn view(&self) -> &View {
-        &self.view
-    }
-
-    fn quantities(&self) -> PathQuantities {
-        self.options.quantities
-    }
-
-    fn difference_step_m(&self) -> f64 {
-        Full::new(self.field, &self.interpolate, self.integrator, self.view, self.options)
-            .difference_step_m()
-    }
+    let interpolant = FieldInterpolant::new(field, interpolant);
+    Box::new(FullOfField::new(field, interpolant, integrator, view, options))
 }

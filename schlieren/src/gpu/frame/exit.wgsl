@@ -75,12 +75,8 @@ fn source_point(at: vec2f) -> vec2f {
     return vec2f(0.0);
 }
 
-// Comparisons with NaN may be left out by compilers.
-fn is_finite(a: f32) -> bool {
-    return (bitcast<u32>(a) & 0x7f800000u) != 0x7f800000u;
-}
-
-// Whether light ends in the field: at bodies, and at places without data unless they are continued.
+// Whether light ends in the field: at bodies, at places without data unless they are continued, or
+// because it turns.
 fn is_stopped(photon: Photon) -> bool {
     return photon.worst_node > params.survives;
 }

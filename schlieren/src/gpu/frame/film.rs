@@ -4,7 +4,7 @@ use crate::film::{Film, Framing, Tally};
 use rayon::prelude::*;
 
 /// Outcomes that film.wgsl counts, in its order.
-const OUTCOMES: usize = 6;
+const OUTCOMES: usize = 7;
 
 /// Where the sums of a film lie in its buffer, in words.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -98,11 +98,12 @@ pub(super) fn pictures<const C: usize>(words: &[u32]) -> Vec<[f32; C]> {
 /// Counts of outcomes but [`Tally::sent`], and the number of steps: the last of what came back.
 pub(super) fn outcomes(words: &[u32]) -> (Tally, u64) {
     let first = words.len() - 2 * OUTCOMES;
-    let [stopped, not_a_number, landed, on_film, steps, blocked_by_solids] =
-        [0, 1, 2, 3, 4, 5].map(|i| sum_of(words, first + 2 * i));
+    let [stopped, not_a_number, landed, on_film, steps, blocked_by_solids, turned] =
+        [0, 1, 2, 3, 4, 5, 6].map(|i| sum_of(words, first + 2 * i));
     let tally = Tally {
         blocked_in_field: stopped,
         blocked_by_solids,
+        turned,
         not_a_number,
         landed,
         on_film,
@@ -121,17 +122,18 @@ mod tests {
         let framing = Framing::fitted(2, 1, [1.0, 1.0]);
         let films = [Film::<1>::new(framing, true), Film::<1>::new(framing, true)];
         let layout = FilmLayout::of(&films);
-        assert_eq!((layout.counts(), layout.outcomes(), layout.words()), (8, 10, 22));
+        assert_eq!((layout.counts(), layout.outcomes(), layout.words()), (8, 10, 24));
         // Energies 1 and 2.5, then 1/2 and 0; 7 and 8 photons; 2^32 steps.
         let half = 1 << 31;
         let mut words = vec![0, 1, half, 2, half, 0, 0, 0, 7, 8];
-        words.extend([1, 0, 2, 0, 3, 0, 4, 0, 0, 1, 5, 0]);
+        words.extend([1, 0, 2, 0, 3, 0, 4, 0, 0, 1, 5, 0, 6, 0]);
         add_to_films(layout, &words, &films);
         let (tally, steps) = outcomes(&words);
         assert_eq!(films[0].to_pixels(1.0), [[1.0], [2.5]]);
         assert_eq!(films[1].to_pixels(1.0), [[0.5], [0.0]]);
         assert_eq!(films[0].counts(), Some(vec![7, 8]));
         let found = [tally.blocked_in_field, tally.not_a_number, tally.landed, tally.on_film];
-        assert_eq!((found, steps, tally.blocked_by_solids), ([1, 2, 3, 4], 1 << 32, 5));
+        assert_eq!((found, steps), ([1, 2, 3, 4], 1 << 32));
+        assert_eq!((tally.blocked_by_solids, tally.turned), (5, 6));
     }
 }

@@ -29,15 +29,16 @@ fn expose(part: u32, pixel: u32, energy: vec3f) {
 }
 
 // Outcomes of a work group, in the order of `Outcomes` of film.rs.
-const OUTCOMES = 6u;
+const OUTCOMES = 7u;
 const STOPPED = 0u;
 const NOT_A_NUMBER = 1u;
 const LANDED = 2u;
 const ON_FILM = 3u;
 const STEPS = 4u;
 const BEHIND_BODY = 5u;
+const TURNED = 6u;
 
-var<workgroup> outcomes: array<atomic<u32>, 6>;
+var<workgroup> outcomes: array<atomic<u32>, 7>;
 
 fn clear_outcomes(lane: u32) {
     if lane < OUTCOMES {

@@ -16,7 +16,8 @@ fn send(x: i32, y: i32, number: u32, ray: u32) {
     let photon = trace(position, image_point);
     atomicAdd(&outcomes[STEPS], photon.steps);
     if is_stopped(photon) {
-        atomicAdd(&outcomes[STOPPED], 1u);
+        let turned = photon.worst_node == TURNED_BIT;
+        atomicAdd(&outcomes[select(STOPPED, TURNED, turned)], 1u);
         return;
     }
     let energy = technique_energy(photon);

@@ -101,6 +101,7 @@ mod tests {
     use super::super::params::FrameParams;
     use super::*;
     use crate::cutoff::{Aperture, ColorWheel, Cutoff, FilterImage, Knife, KnifePosition, Passes};
+    use crate::gpu::Method;
     use crate::gpu::kernel::FieldLayout;
     use crate::interpolate::Interpolant;
     use crate::optics::{Optics, SourceShape};
@@ -161,6 +162,7 @@ mod tests {
                 let source = technique.optics().source_image();
                 let shader = FrameShader {
                     march: Kernel {
+                        method: Method::ALL[(k % 5) as usize],
                         interpolant: Interpolant::BSpline,
                         opd: technique.needs_opd(),
                         nodes: k & 1 != 0,

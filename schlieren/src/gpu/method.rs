@@ -1,0 +1,60 @@
+//! The methods that march rays on the device, and their options.
+
+use crate::march::BlankCells;
+use crate::path::PathQuantities;
+
+/// How rays are stepped through the field.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Method {
+    /// Position Verlet of deviations, in `f32` as on the CPU ([`crate::march::Deviational`]). The
+    /// default.
+    #[default]
+    Verlet,
+    /// Explicit Euler of deviations, in `f32` as on the CPU.
+    Euler,
+    /// PEFRL through a strong index. The CPU's is in `f64` ([`crate::march::Full`]).
+    Pefrl,
+    /// Runge-Kutta-Nystroem by Sharma, Kumar and Ghatak, likewise.
+    Sharma,
+    /// The classical Runge-Kutta method, likewise.
+    RungeKutta4,
+}
+
+impl Method {
+    /// All methods.
+    pub const ALL: [Method; 5] =
+        [Method::Verlet, Method::Euler, Method::Pefrl, Method::Sharma, Method::RungeKutta4];
+
+    /// Samples of the field per step.
+    pub(super) fn samples(self) -> usize {
+        match self {
+            Method::Verlet | Method::Euler => 1,
+            Method::Sharma => 3,
+            Method::Pefrl | Method::RungeKutta4 => 4,
+        }
+    }
+}
+
+/// Options of the march.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GpuOptions {
+    /// How rays are stepped.
+    pub method: Method,
+    /// Longest step, in lattice steps.
+    pub step_voxels: f64,
+    /// Quantities to compute besides deflection and displacement.
+    pub quantities: PathQuantities,
+    /// How cells without data treat light.
+    pub blank: BlankCells,
+}
+
+impl Default for GpuOptions {
+    fn default() -> Self {
+        GpuOptions {
+            method: Method::Verlet,
+            step_voxels: 1.0,
+            quantities: PathQuantities::default(),
+            blank: BlankCells::Opaque,
+        }
+    }
+}
