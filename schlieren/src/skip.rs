@@ -39,6 +39,19 @@ impl Bricks {
     /// Computes bounds for the B-spline through a field. They also hold for the trilinear
     /// interpolants, which stay between the values and differences of the nodes.
     pub fn new(field: &Field, spline: &BSpline) -> Bricks {
+        Bricks::in_jobs_of(field, spline, 1)
+    }
+
+    /// [`Bricks::new`] on the calling thread alone, which waits for no other thread.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn on_this_thread(field: &Field, spline: &BSpline) -> Bricks {
+        // Rayon does not divide ranges that are shorter than this minimum, and an undivided range
+        // runs on the calling thread.
+        Bricks::in_jobs_of(field, spline, usize::MAX)
+    }
+
+    /// [`Bricks::new`] in rayon jobs of at least `least` bricks.
+    fn in_jobs_of(field: &Field, spline: &BSpline, least: usize) -> Bricks {
         let start = Instant::now();
         let [nx, ny, nz] = field.dims();
         let dims = field.dims().map(|n| (n - 1).div_ceil(EDGE));
@@ -50,6 +63,7 @@ impl Bricks {
         // indices are larger by one.
         let own: Vec<Brick> = (0..dims[0] * dims[1] * dims[2])
             .into_par_iter()
+            .with_min_len(least)
             .map(|b| {
                 let first = [
                     b % dims[0] * EDGE,
@@ -106,6 +120,7 @@ impl Bricks {
         // neighbours bound the rest of the stride.
         let bricks = (0..own.len())
             .into_par_iter()
+            .with_min_len(least)
             .map(|b| {
                 let at = [b % dims[0], b / dims[0] % dims[1], b / (dims[0] * dims[1])];
                 let range = |c: usize| at[c].saturating_sub(1)..=(at[c] + 1).min(dims[c] - 1);
@@ -131,6 +146,12 @@ impl Bricks {
             })
             .collect();
         Bricks { bricks, dims, build: start.elapsed() }
+    }
+
+    /// All bricks, x fastest.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn all(&self) -> &[Brick] {
+        &self.bricks
     }
 
     /// The bounds at a point in lattice coordinates. Points outside use the nearest brick.

@@ -46,7 +46,7 @@ fn cpu<'a>(
     interpolant: Interpolant,
     options: GpuOptions,
 ) -> Deviational<'a> {
-    let GpuOptions { method, step_voxels, quantities, blank } = options;
+    let GpuOptions { method, step_voxels, quantities, blank, .. } = options;
     let scheme = if method == Method::Euler { Scheme::Euler } else { Scheme::Verlet };
     let options = Options { scheme, step_voxels, quantities, blank, ..Options::default() };
     Deviational::new(field, view, interpolant, options)
@@ -73,7 +73,7 @@ fn full_with<I: Interpolate>(
     field: &Field,
     interpolate: &I,
     view: View,
-    GpuOptions { method, step_voxels, quantities, blank }: GpuOptions,
+    GpuOptions { method, step_voxels, quantities, blank, .. }: GpuOptions,
     starts: &[Start],
 ) -> Vec<Exit> {
     let options = FullOptions { step_voxels, quantities, blank, ..FullOptions::default() };
@@ -422,6 +422,66 @@ fn masks_stop_the_rays_that_they_stop_on_the_cpu() {
         let dark = a.iter().filter(|e| e.transmission == 0.0).count();
         assert!((10..400).contains(&dark), "{dark} of {} rays are stopped", a.len());
     }
+}
+
+/// Rays skip gas that bends them by less than the tolerance in all, each by itself: no more of the
+/// deflection is lost than the report says, and the report says no more than the tolerance.
+#[test]
+fn skipped_gas_bends_no_ray_by_more_than_the_tolerance() {
+    let Some(gpu) = gpu() else { return };
+    let field = cube(65, |p| lopsided(2.5 * p));
+    let body = Field::new(
+        field.dims(),
+        field.spacing_m(),
+        field.origin_m(),
+        field.eps().to_vec(),
+        1.0,
+        with_body(65).nodes().map(<[Node]>::to_vec),
+    )
+    .unwrap();
+    let starts = grid(24, 0.9);
+    for (field, blank) in [(&field, BlankCells::Opaque), (&body, BlankCells::Continued)] {
+        for interpolant in [Interpolant::BSpline, Interpolant::Trilinear] {
+            for skip_rad in [1e-9, 1e-7] {
+                let options = GpuOptions {
+                    quantities: PathQuantities { opd: true },
+                    blank,
+                    skip_rad,
+                    skip_opd_m: 1e-10,
+                    ..GpuOptions::default()
+                };
+                let paths =
+                    GpuPaths::new(gpu.clone(), field, oblique(), interpolant, options).unwrap();
+                let skipped = trace(&paths, &starts);
+                let report = paths.skip_report().unwrap();
+                let all = GpuOptions { skip_rad: 0.0, ..options };
+                let paths = GpuPaths::new(gpu.clone(), field, oblique(), interpolant, all).unwrap();
+                let expected = trace(&paths, &starts);
+                assert_eq!(paths.skip_report(), None);
+                // A ray that is bent less meets other gas: twice the bound, as on the CPU.
+                let (_, max) = difference(&skipped, &expected);
+                let lost = max * largest(&expected);
+                assert!(lost <= 2.0 * report.bound_rad, "{lost:e} rad, {report:?}");
+                assert!(report.bound_rad <= skip_rad && report.bound_rad > 0.0, "{report:?}");
+                assert!((0.1..0.9).contains(&report.steps_part), "{report:?}");
+                let stretches = 110.0 / 8.0;
+                for (a, b) in skipped.iter().zip(&expected) {
+                    assert_eq!((a.status, a.transmission), (b.status, b.transmission));
+                    let d = f64::from((a.opd_m - b.opd_m).abs());
+                    assert!(d < stretches * 1e-10 + 1e-12, "{d:e} m");
+                }
+                // Each ray skips by itself.
+                let some: Vec<Start> = starts.iter().step_by(7).copied().collect();
+                let paths =
+                    GpuPaths::new(gpu.clone(), field, oblique(), interpolant, options).unwrap();
+                let alone: Vec<Exit> = skipped.iter().step_by(7).copied().collect();
+                assert_eq!(trace(&paths, &some), alone);
+            }
+        }
+    }
+    let options = GpuOptions { method: Method::Pefrl, skip_rad: 1e-9, ..GpuOptions::default() };
+    let e = GpuPaths::new(gpu, &field, oblique(), Interpolant::BSpline, options).err().unwrap();
+    assert!(e.to_string().contains("Pefrl"), "{e}");
 }
 
 /// A field divided into slabs gives the same exits bit for bit, because the arithmetic is the same.

@@ -214,6 +214,36 @@ fn rays_that_turn_are_counted_and_dark_on_both() {
     }
 }
 
+/// The tolerance for skipping is far below what a picture shows, and the report is that of the
+/// device's own rays.
+#[test]
+fn a_frame_that_skips_gas_is_the_frame_that_does_not() {
+    if !has_gpu() {
+        return;
+    }
+    let field = cube(65, |p| lopsided(2.5 * p));
+    for rest in [format!("{KNIFE}{BEAMS}"), format!("{KNIFE}{PHOTONS}")] {
+        let toml = |device: &str, skip: &str| {
+            let mut scene = scene(device, "", &rest);
+            scene.march.skip_rad = skip.parse().unwrap();
+            scene
+        };
+        let [gpu, cpu, all] = [("gpu", "1e-9"), ("cpu", "1e-9"), ("gpu", "0")]
+            .map(|(d, s)| exposed(&field, &toml(d, s)));
+        assert!(
+            gpu.report.march.contains("skipping at most 1e-9 rad, on "),
+            "{}",
+            gpu.report.march
+        );
+        assert!(difference(&gpu, &cpu)[0] < 2e-5 && difference(&gpu, &all)[0] < 2e-5);
+        let [a, b] = [&gpu, &cpu].map(|o| o.report.skip_report.unwrap());
+        assert!(a.bound_rad > 0.0 && a.bound_rad <= 1e-9, "{a:?}");
+        // Rays that decide by themselves skip more than packets.
+        assert!(a.steps_part >= b.steps_part && a.steps_part < 0.95, "{a:?} {b:?}");
+        assert_eq!(all.report.skip_report, None);
+    }
+}
+
 /// Oblique views, and beams tilted by an extended source, clip the field at other faces for each
 /// ray.
 #[test]

@@ -66,7 +66,7 @@ pub(super) struct MarchArgs {
     #[arg(long, value_name = "VOXELS")]
     step: Option<f64>,
     /// Skip gas so uniform that no ray's deflection changes by more than this in total: 1e-9rad.
-    /// For verlet on the CPU
+    /// For verlet
     #[arg(long, value_name = "ANGLE", value_parser = units::angle_rad)]
     skip: Option<f64>,
     /// Where to trace: gpu needs a Vulkan device; auto uses one if possible, else warns why

@@ -216,7 +216,8 @@ fn march_on_this_thread<'a>(
     interpolant: Interpolant,
     options: GpuOptions,
 ) -> Box<dyn LightPaths + Send + 'a> {
-    let GpuOptions { method, step_voxels, quantities, blank } = options;
+    // What the CPU traces in place of the device, it does not skip: bricks are made by all threads.
+    let GpuOptions { method, step_voxels, quantities, blank, .. } = options;
     let deviational = |scheme| -> Box<dyn LightPaths + Send + 'a> {
         let options = Options { scheme, step_voxels, quantities, blank, ..Options::default() };
         Box::new(Deviational::on_this_thread(field, view, interpolant, options))

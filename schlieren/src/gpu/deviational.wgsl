@@ -1,7 +1,20 @@
 // Integrates deviations from straight rays by position Verlet, or by explicit Euler. This is the
 // kernel of march/packet.rs in WGSL, with the same order of operations.
 //
-// The host adds what march.wgsl names, `const EULER` and `const COMPENSATED`.
+// The host adds what march.wgsl names, `const EULER`, `const COMPENSATED`, `const SKIP`, and
+// `brick_around` and `count_skipping` (from bricks.wgsl, or without effect).
+
+// Number of steps that are skipped at once where a brick allows it.
+const STRETCH = 8u;
+
+// What an element of the way adds to the optical path, by its length: (1+eps)^2 - w_z =
+// eps (1 + eps) + u_t^2 / (1 + eps + w_z). All terms are small, and none is a difference.
+fn path_rate(eps: f32, v: vec3f, along: vec3f, eps_at_entry: f32) -> f32 {
+    let square = dot(v * params.h2, v);
+    let u_z = dot(v, along);
+    let transverse = square - u_z * u_z;
+    return fma(eps, eps, eps) + transverse / (eps + u_z + eps_at_entry + 2.0);
+}
 
 fn march_ray(ray: Ray) -> KernelOutput {
     var xi = ray.xi;
@@ -17,10 +30,34 @@ fn march_ray(ray: Ray) -> KernelOutput {
     let middle = 0.5 * f32(ray.steps);
     var dt_whole = ray.dt;
     var eps_at_entry = 0.0;
+    var skipped = 0u;
+    var skipped_rad = 0.0;
 
     // Two more iterations than steps: one samples the entry, one ends in the exit plane. They are
     // in the same loop so that there is one copy of the sampling code.
-    for (var n = 0u; n < ray.steps + 2u; n++) {
+    var n = 0u;
+    while n < ray.steps + 2u {
+        if SKIP && n > 0u && (n - 1u) % STRETCH == 0u && n - 1u + STRETCH <= ray.steps {
+            let at = fma(vec3f(f32(n + STRETCH / 2u) - 1.0 - middle), ray.stride, ray.middle) + xi;
+            let brick = brick_around(at);
+            let length = f32(STRETCH) * dt_whole;
+            let lost_rad = fma(brick.x, length, skipped_rad);
+            let is_vague = OPD && brick.z * length > params.skip_opd;
+            if lost_rad <= params.skip_rad && brick.w == 0.0 && !is_vague {
+                skipped_rad = lost_rad;
+                skipped += STRETCH;
+                n += STRETCH;
+                xi = fma(vec3f(length), v, xi);
+                if OPD {
+                    let more = path_rate(brick.y, v, ray.along, eps_at_entry);
+                    let term = fma(length, more, -opd_rest);
+                    let sum = rounded(opd + term);
+                    opd_rest = rounded(sum - opd) - term;
+                    opd = sum;
+                }
+                continue;
+            }
+        }
         // Verlet takes samples in the middle of a step, Euler at its start.
         var number = f32(n) - select(0.5, 1.0, EULER) - middle;
         var move_by = dt_whole;
@@ -64,12 +101,8 @@ fn march_ray(ray: Ray) -> KernelOutput {
             v = fma(push, here.xyz, v);
         }
         if OPD {
-            // (1+eps)^2 - w_z = eps (1 + eps) + u_t^2 / (1 + eps + w_z), with the mean of v before
-            // and after. All terms are small, and none is a difference.
-            let square = dot(middle_v * params.h2, middle_v);
-            let u_z = dot(middle_v, ray.along);
-            let transverse = square - u_z * u_z;
-            let more = fma(eps, eps, eps) + transverse / (eps + u_z + eps_at_entry + 2.0);
+            // With the mean of v before and after.
+            let more = path_rate(eps, middle_v, ray.along, eps_at_entry);
             let term = fma(dt, more, -opd_rest);
             let sum = rounded(opd + term);
             opd_rest = rounded(sum - opd) - term;
@@ -82,6 +115,10 @@ fn march_ray(ray: Ray) -> KernelOutput {
         } else if leaving {
             xi = fma(vec3f(0.5 * dt), v, xi);
         }
+        n++;
+    }
+    if SKIP {
+        count_skipping(ray.steps, skipped, skipped_rad);
     }
     return KernelOutput(v, opd, xi, worst_node);
 }

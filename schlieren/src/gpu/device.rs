@@ -1,7 +1,7 @@
 //! Finds a GPU, opens it, and reopens it after a failure.
 
 use super::GpuError;
-use super::kernel::FIRST_SLAB;
+use super::kernel::{FIRST_SLAB, MOST_SLABS};
 use super::part_size::PartSize;
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -217,7 +217,7 @@ impl Gpu {
     /// Number of bindings that a kernel has for the field.
     pub(super) fn slabs(&self) -> u32 {
         // The parameters are not a storage buffer.
-        self.storage_buffers.saturating_sub(FIRST_SLAB - 1)
+        self.storage_buffers.saturating_sub(FIRST_SLAB - 1).min(MOST_SLABS)
     }
 
     /// The failure of the device, if any.

@@ -7,6 +7,11 @@ use crate::interpolate::Interpolant;
 /// First binding of the field's slabs. The bindings before it are parameters, rays, kernel outputs
 /// and kinds of nodes.
 pub(super) const FIRST_SLAB: u32 = 4;
+/// Largest number of slabs.
+pub(super) const MOST_SLABS: u32 = 60;
+/// Bindings of the bricks, and of the counts of skipped steps.
+pub(super) const BRICKS: u32 = FIRST_SLAB + MOST_SLABS;
+pub(super) const SKIPPING: u32 = BRICKS + 1;
 
 /// How the field lies on the device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -41,6 +46,8 @@ pub(super) struct Kernel {
     pub(super) interpolant: Interpolant,
     /// Whether it computes the optical path difference.
     pub(super) opd: bool,
+    /// Whether rays skip bricks. For [`Method::Verlet`].
+    pub(super) skip: bool,
     /// Whether the field has blank or solid nodes.
     pub(super) nodes: bool,
     /// Rows are of [`Interpolant::BSpline`] only.
@@ -58,9 +65,10 @@ impl Kernel {
         // Only the B-spline is accurate enough to need compensated sums, as on the CPU.
         let spline = self.interpolant == Interpolant::BSpline;
         let mut text = format!(
-            "const OPD = {};\nconst COMPENSATED = {spline};\nconst EULER = {};\n",
+            "const OPD = {};\nconst COMPENSATED = {spline};\nconst EULER = {};\nconst SKIP = {};\n",
             self.opd,
             self.method == Method::Euler,
+            self.skip,
         );
         text += include_str!("march.wgsl");
         text += match self.method {
@@ -68,6 +76,15 @@ impl Kernel {
             Method::Pefrl => concat!(include_str!("full.wgsl"), include_str!("pefrl.wgsl")),
             Method::Sharma => concat!(include_str!("full.wgsl"), include_str!("sharma.wgsl")),
             Method::RungeKutta4 => concat!(include_str!("full.wgsl"), include_str!("rk4.wgsl")),
+        };
+        text += &if self.skip {
+            include_str!("bricks.wgsl")
+                .replace("BRICKS_BINDING", &BRICKS.to_string())
+                .replace("SKIPPING_BINDING", &SKIPPING.to_string())
+        } else {
+            "fn brick_around(at: vec3f) -> vec4f {\n    return vec4f(0.0);\n}\n\nfn \
+             count_skipping(steps: u32, skipped: u32, bound_rad: f32) {\n}\n"
+                .to_string()
         };
         text += if self.nodes {
             include_str!("nodes.wgsl")
@@ -145,23 +162,32 @@ mod tests {
         FieldLayout::RowBuffer,
     ];
 
-    const METHODS: [Method; 5] = Method::ALL;
     const INTERPOLANTS: [Interpolant; 3] =
         [Interpolant::BSpline, Interpolant::Trilinear, Interpolant::TrilinearGradient];
 
     fn all() -> impl Iterator<Item = Kernel> {
-        let of = |k: u32| Kernel {
-            method: METHODS[k as usize / 5 % METHODS.len()],
-            interpolant: INTERPOLANTS[k as usize / 5 / METHODS.len() % 3],
-            opd: (k / 15) as usize / METHODS.len() % 2 != 0,
-            nodes: (k / 30) as usize / METHODS.len() % 2 != 0,
-            layout: LAYOUTS[k as usize % 5],
+        let of = |method, interpolant, layout, k: u32| Kernel {
+            method,
+            interpolant,
+            opd: k & 1 != 0,
+            nodes: k & 2 != 0,
+            skip: k & 4 != 0,
+            layout,
         };
-        // Rows are coefficients.
-        let are_slabs = |k: &Kernel| matches!(k.layout, FieldLayout::Slabs(_));
-        (0..60 * METHODS.len() as u32)
-            .map(of)
-            .filter(move |k| are_slabs(k) || k.interpolant == Interpolant::BSpline)
+        let mut kernels = Vec::new();
+        for method in Method::ALL {
+            for interpolant in INTERPOLANTS {
+                for layout in LAYOUTS {
+                    // Rows are coefficients, and one march skips.
+                    let is_slabs = matches!(layout, FieldLayout::Slabs(_));
+                    if is_slabs || interpolant == Interpolant::BSpline {
+                        let features = if method == Method::Verlet { 8 } else { 4 };
+                        kernels.extend((0..features).map(|k| of(method, interpolant, layout, k)));
+                    }
+                }
+            }
+        }
+        kernels.into_iter()
     }
 
     fn parsed(wgsl: &str) -> naga::Module {
@@ -204,7 +230,11 @@ mod tests {
             let module = parsed(&kernel.of_rays());
             let bound =
                 module.global_variables.iter().filter(|(_, v)| v.binding.is_some()).count() as u32;
-            assert_eq!(bound, 3 + u32::from(kernel.nodes) + kernel.layout.bindings(), "{kernel:?}");
+            assert_eq!(
+                bound,
+                3 + u32::from(kernel.nodes) + 2 * u32::from(kernel.skip) + kernel.layout.bindings(),
+                "{kernel:?}"
+            );
         }
     }
 }

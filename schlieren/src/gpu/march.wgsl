@@ -48,8 +48,10 @@ struct Params {
     slab: u32,
     // Always 0, but unknown to the compiler.
     zero: u32,
-    unused_0: u32,
-    unused_1: u32,
+    // The largest lost deflection of a ray, and the largest error of the path of a skipped stretch,
+    // in units of the march.
+    skip_rad: f32,
+    skip_opd: f32,
     unused_2: u32,
 }
 

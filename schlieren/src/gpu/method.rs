@@ -46,6 +46,11 @@ pub struct GpuOptions {
     pub quantities: PathQuantities,
     /// How cells without data treat light.
     pub blank: BlankCells,
+    /// Skip bricks as long as the bounds on the lost deflection of a ray add up to less than this
+    /// ([`crate::march::Options::skip_rad`]). Each ray skips by itself. For [`Method::Verlet`].
+    pub skip_rad: f64,
+    /// [`crate::march::Options::skip_opd_m`].
+    pub skip_opd_m: f64,
 }
 
 impl Default for GpuOptions {
@@ -55,6 +60,8 @@ impl Default for GpuOptions {
             step_voxels: 1.0,
             quantities: PathQuantities::default(),
             blank: BlankCells::Opaque,
+            skip_rad: 0.0,
+            skip_opd_m: 0.0,
         }
     }
 }

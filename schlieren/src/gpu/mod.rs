@@ -12,6 +12,7 @@
 //! | device.rs | [`Gpu`]: finds an adapter, opens it, knows its limits |
 //! | method.rs | how rays are stepped |
 //! | kernel.rs, *.wgsl | the shader, assembled from what a scene needs |
+//! | bricks.rs | bricks that rays skip, and counts of what they skipped |
 //! | volume.rs, rows.rs | the field on the device: in slabs, or in rows of four coefficients |
 //! | part_size.rs | how many photons a device gets at a time |
 //! | paths.rs | [`GpuPaths`]: traces starts to exits in batches |
@@ -20,6 +21,7 @@
 //!
 //! Line of sight has no kernel. It is refused by name ([`GpuError::Unsupported`]).
 
+mod bricks;
 mod cpu_fallback;
 mod device;
 mod frame;

@@ -1,16 +1,17 @@
 //! Traces rays on the GPU in batches: [`GpuPaths`].
 
+use super::bricks::{self, DeviceBricks};
 use super::cpu_fallback::{BatchTracer, CpuFallback, Failure};
 use super::device::MAX_REOPENINGS;
-use super::kernel::Kernel;
-use super::method::GpuOptions;
+use super::kernel::{BRICKS, Kernel, SKIPPING};
+use super::method::{GpuOptions, Method};
 use super::volume::{DeviceVolume, NodeValues, VolumeCache};
 use super::work::{GpuCounters, Work};
 use super::{Gpu, GpuError};
 use crate::field::Field;
-use crate::interpolate::Interpolant;
+use crate::interpolate::{BSpline, Interpolant};
 use crate::march::{BlankCells, FieldCache, Frame, KernelOutput, KernelRay};
-use crate::path::{Exit, LightPaths, PathQuantities, Start};
+use crate::path::{Exit, LightPaths, PathQuantities, SkipReport, Start};
 use crate::view::View;
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
@@ -57,6 +58,8 @@ pub(super) struct DeviceState {
     pub(super) kernel: Kernel,
     pipeline: wgpu::ComputePipeline,
     pub(super) volume: Arc<DeviceVolume>,
+    /// Counts of the steps that rays skip.
+    skipping: Option<wgpu::Buffer>,
     /// Buffers that no batch is using.
     idle: Mutex<Vec<Scratch>>,
 }
@@ -80,11 +83,34 @@ impl DeviceState {
             method: options.method,
             interpolant,
             opd: options.quantities.opd,
+            skip: volume.bricks.is_some(),
             nodes: volume.kinds.is_some(),
             layout: volume.values.layout(),
         };
         let pipeline = gpu.pipeline(kernel.of_rays(), "march")?;
-        Ok(DeviceState { gpu, number, kernel, pipeline, volume, idle: Mutex::default() })
+        let skipping = volume.bricks.is_some().then(|| bricks::counts(&gpu)).transpose()?;
+        let idle = Mutex::default();
+        Ok(DeviceState { gpu, number, kernel, pipeline, volume, skipping, idle })
+    }
+
+    /// What a march reads of the field, and where it counts what it skips.
+    pub(super) fn field_bindings(&self) -> Vec<(u32, wgpu::BindingResource<'_>)> {
+        let volume = &self.volume;
+        let buffers = [
+            (3, volume.kinds.as_ref()),
+            (BRICKS, volume.bricks.as_ref().map(|b| &b.buffer)),
+            (SKIPPING, self.skipping.as_ref()),
+        ];
+        let mut bound = volume.values.bindings();
+        bound
+            .extend(buffers.into_iter().filter_map(|(i, b)| b.map(|b| (i, b.as_entire_binding()))));
+        bound
+    }
+
+    /// Number of storage buffers of [`DeviceState::field_bindings`].
+    pub(super) fn field_buffers(&self) -> u32 {
+        let skipping = if self.volume.bricks.is_some() { 2 } else { 0 };
+        u32::from(self.volume.kinds.is_some()) + self.volume.values.layout().buffers() + skipping
     }
 
     fn failure(&self, error: GpuError) -> Failure {
@@ -116,11 +142,9 @@ impl DeviceState {
             let outputs = buffer(output_bytes, BufferUsages::STORAGE | BufferUsages::COPY_SRC);
             let readback = buffer(output_bytes, BufferUsages::MAP_READ | BufferUsages::COPY_DST);
             let mut bound: Vec<_> = [(0, &params), (1, &rays), (2, &outputs)]
-                .into_iter()
-                .chain(self.volume.kinds.as_ref().map(|k| (3, k)))
                 .map(|(binding, b)| (binding, b.as_entire_binding()))
-                .collect();
-            bound.extend(self.volume.values.bindings());
+                .into();
+            bound.extend(self.field_bindings());
             let entries: Vec<_> = bound
                 .into_iter()
                 .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
@@ -174,7 +198,9 @@ pub(super) struct Params {
     dims: [u32; 3],
     slab: u32,
     zero: u32,
-    unused: [u32; 3],
+    skip_rad: f32,
+    skip_opd: f32,
+    unused: u32,
 }
 
 /// Buffers for one batch.
@@ -200,7 +226,7 @@ impl<'a> GpuPaths<'a> {
     /// Compiles the kernel and copies the field (or its spline) to the device.
     ///
     /// # Errors
-    /// If the field does not fit, or the device fails.
+    /// If the field does not fit, the device fails, or a method other than Verlet shall skip.
     pub fn new(
         gpu: Arc<Gpu>,
         field: &'a Field,
@@ -225,7 +251,14 @@ impl<'a> GpuPaths<'a> {
         options: GpuOptions,
         caches: (&FieldCache, &VolumeCache),
     ) -> Result<GpuPaths<'a>, GpuError> {
-        let (volume, bytes) = caches.1.volume(&gpu, field, interpolant, caches.0)?;
+        let skip = options.skip_rad > 0.0;
+        if skip && options.method != Method::Verlet {
+            return Err(GpuError::Unsupported {
+                what: format!("skipping with {:?}", options.method),
+                cure: "Set GpuOptions::skip_rad to 0, or march by Method::Verlet.",
+            });
+        }
+        let (volume, bytes) = caches.1.volume(&gpu, field, (interpolant, skip), caches.0)?;
         let work = Work::default();
         work.add_to_device(bytes);
         let on_device = DeviceState::new(gpu, 0, volume, interpolant, options)?;
@@ -294,7 +327,9 @@ impl<'a> GpuPaths<'a> {
             dims: dims.map(|n| n as u32),
             slab: volume.layers as u32,
             zero: 0,
-            unused: [0; 3],
+            skip_rad: self.options.skip_rad as f32,
+            skip_opd: (self.options.skip_opd_m / self.frame.unit_m) as f32,
+            unused: 0,
         }
     }
 
@@ -441,7 +476,15 @@ impl GpuPaths<'_> {
         let gpu = gpu.current()?;
         let values = NodeValues::on_this_thread(self.field, self.interpolant);
         let number = failed.device + 1;
-        let volume = Arc::new(DeviceVolume::new(&gpu, self.field, &values)?);
+        let bricks = match &values {
+            _ if self.options.skip_rad <= 0.0 => None,
+            NodeValues::BSpline(spline) => Some(DeviceBricks::new(&gpu, self.field, spline, true)?),
+            _ => {
+                let spline = BSpline::on_this_thread(self.field);
+                Some(DeviceBricks::new(&gpu, self.field, &spline, true)?)
+            }
+        };
+        let volume = Arc::new(DeviceVolume::new(&gpu, self.field, &values, bricks)?);
         self.work.add_to_device(volume.bytes);
         let made = DeviceState::new(gpu, number, volume, self.interpolant, self.options)?;
         current.on_device = Arc::new(made);
@@ -469,6 +512,17 @@ impl LightPaths for GpuPaths<'_> {
 
     fn difference_step_m(&self) -> f64 {
         0.5 * DVec3::min_element(self.frame.spacing_m)
+    }
+
+    fn skip_report(&self) -> Option<SkipReport> {
+        let on_device = self.on_device();
+        let bricks = on_device.volume.bricks.as_ref()?;
+        let counts = on_device.skipping.as_ref()?;
+        // What a lost device counted is lost, but every ray keeps the tolerance.
+        let (steps, bound_rad) =
+            bricks::read_counts(&on_device.gpu, counts).unwrap_or(([0; 2], self.options.skip_rad));
+        let bound_rad = if on_device.number > 0 { self.options.skip_rad } else { bound_rad };
+        Some(bricks.report(steps, bound_rad))
     }
 
     fn device_warning(&self) -> Option<String> {

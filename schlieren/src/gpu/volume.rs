@@ -1,6 +1,7 @@
 //! Copies the field to the device: its nodes or the coefficients of its spline, in slabs of layers
 //! that fit a binding.
 
+use super::bricks::DeviceBricks;
 use super::device::UPLOAD_BYTES;
 use super::kernel::{FIRST_SLAB, FieldLayout};
 use super::rows::{self, Rows};
@@ -21,6 +22,7 @@ pub struct VolumeCache {
 struct Kept {
     gpu: Arc<Gpu>,
     interpolant: Interpolant,
+    skip: bool,
     volume: Arc<DeviceVolume>,
 }
 
@@ -34,11 +36,12 @@ impl VolumeCache {
         &self,
         gpu: &Arc<Gpu>,
         field: &Field,
-        interpolant: Interpolant,
+        (interpolant, skip): (Interpolant, bool),
         cache: &FieldCache,
     ) -> Result<(Arc<DeviceVolume>, u64), GpuError> {
         let lock = || self.kept.lock().unwrap_or_else(PoisonError::into_inner);
-        let is_this = |k: &&Kept| Arc::ptr_eq(&k.gpu, gpu) && k.interpolant == interpolant;
+        let is_this =
+            |k: &&Kept| Arc::ptr_eq(&k.gpu, gpu) && k.interpolant == interpolant && k.skip == skip;
         if let Some(kept) = lock().as_ref().filter(is_this) {
             return Ok((Arc::clone(&kept.volume), 0));
         }
@@ -50,9 +53,11 @@ impl VolumeCache {
                 NodeValues::TrilinearGradient(TrilinearGradient::new(field))
             }
         };
-        let volume = Arc::new(DeviceVolume::new(gpu, field, &values)?);
+        let bricks =
+            skip.then(|| DeviceBricks::new(gpu, field, &cache.spline(field), false)).transpose()?;
+        let volume = Arc::new(DeviceVolume::new(gpu, field, &values, bricks)?);
         let (gpu, kept) = (Arc::clone(gpu), Arc::clone(&volume));
-        *lock() = Some(Kept { gpu, interpolant, volume: kept });
+        *lock() = Some(Kept { gpu, interpolant, skip, volume: kept });
         let bytes = volume.bytes;
         Ok((volume, bytes))
     }
@@ -146,6 +151,8 @@ pub(super) struct DeviceVolume {
     pub(super) values: Values,
     /// Kinds of the nodes, two bits each, if not all are gas.
     pub(super) kinds: Option<wgpu::Buffer>,
+    /// Bricks, if rays skip them.
+    pub(super) bricks: Option<DeviceBricks>,
     /// Strides of neighbours along y and z.
     pub(super) stride: [usize; 2],
     /// Number of layers of cells in a slab.
@@ -160,6 +167,7 @@ impl DeviceVolume {
         gpu: &Gpu,
         field: &Field,
         values: &NodeValues,
+        bricks: Option<DeviceBricks>,
     ) -> Result<DeviceVolume, GpuError> {
         let [nx, ny, nz] = field.dims();
         let is_spline = matches!(values, NodeValues::BSpline(_));
@@ -180,19 +188,24 @@ impl DeviceVolume {
             return Err(too_large("the mask", need, available));
         }
         let kinds = words.map(|w| upload(gpu, bytemuck::cast_slice(&w))).transpose()?;
-        let of_kinds = kinds.as_ref().map_or(0, wgpu::Buffer::size);
+        let of_others = [kinds.as_ref(), bricks.as_ref().map(|b| &b.buffer)]
+            .into_iter()
+            .flatten()
+            .map(wgpu::Buffer::size)
+            .sum::<u64>();
+        // Skipping takes two bindings.
+        let most_slabs = gpu.slabs().saturating_sub(if bricks.is_some() { 2 } else { 0 });
         if is_spline && let Some(rows) = rows::upload(gpu, values, [nx + 2, ny + 2, nz + 2])? {
             let (rows, stride, of_rows) = rows;
-            let (values, bytes) = (Values::Rows(rows), of_kinds + of_rows);
-            return Ok(DeviceVolume { values, kinds, stride, layers: nz - 1, bytes });
+            let (values, bytes) = (Values::Rows(rows), of_others + of_rows);
+            return Ok(DeviceVolume { values, kinds, bricks, stride, layers: nz - 1, bytes });
         }
         let layer = per_node * stride[1];
         let Some((count, layers)) =
-            cut(nz - 1, halo, (4 * layer) as u64, gpu.binding_bytes(), gpu.slabs())
+            cut(nz - 1, halo, (4 * layer) as u64, gpu.binding_bytes(), most_slabs)
         else {
             let need = bytes_of(size_of_val(values) as u64);
-            let available =
-                format!("{} bindings of {}", gpu.slabs(), bytes_of(gpu.binding_bytes()));
+            let available = format!("{most_slabs} bindings of {}", bytes_of(gpu.binding_bytes()));
             return Err(too_large("a field", need, available));
         };
         let slabs = (0..count)
@@ -202,8 +215,8 @@ impl DeviceVolume {
                 upload(gpu, bytemuck::cast_slice(&values[first * layer..last * layer]))
             })
             .collect::<Result<Vec<_>, _>>()?;
-        let bytes = of_kinds + slabs.iter().map(wgpu::Buffer::size).sum::<u64>();
-        Ok(DeviceVolume { values: Values::Slabs(slabs), kinds, stride, layers, bytes })
+        let bytes = of_others + slabs.iter().map(wgpu::Buffer::size).sum::<u64>();
+        Ok(DeviceVolume { values: Values::Slabs(slabs), kinds, bricks, stride, layers, bytes })
     }
 }
 
@@ -232,7 +245,7 @@ fn packed(nodes: &[crate::field::Node]) -> Vec<u32> {
     nodes.chunks(16).map(word).collect()
 }
 
-fn upload(gpu: &Gpu, bytes: &[u8]) -> Result<wgpu::Buffer, GpuError> {
+pub(super) fn upload(gpu: &Gpu, bytes: &[u8]) -> Result<wgpu::Buffer, GpuError> {
     gpu.checked(|| {
         let buffer = gpu.device.create_buffer(&BufferDescriptor {
             label: Some("field"),

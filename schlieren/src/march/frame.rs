@@ -72,8 +72,13 @@ impl Frame {
             spacing_m,
             last: DVec3::from(dims.map(|nodes| (nodes - 1) as f64)),
             centre: (view.centre_m - origin_m) / spacing_m,
-            unit_m: spacing_m.max_element().log2().round().exp2(),
+            unit_m: Frame::unit_of(spacing_m),
         }
+    }
+
+    /// See [`Frame::unit_m`].
+    pub(crate) fn unit_of(spacing_m: DVec3) -> f64 {
+        spacing_m.max_element().log2().round().exp2()
     }
 
     /// The undisturbed ray of a start. `known` caches the last beam and its tilt, because

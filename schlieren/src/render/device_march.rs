@@ -26,13 +26,10 @@ pub(super) struct DeviceMarch {
 
 /// The error for options that a scene names but that have no kernel.
 pub(super) fn unsupported(march: &MarchSpec) -> Option<GpuError> {
-    let what = match march.method.as_deref() {
-        Some("line-of-sight") => "the march line-of-sight",
-        _ if march.skip_rad > 0.0 => "skipping uniform gas (march.skip_rad)",
-        _ => return None,
-    };
-    let cure = "Omit --march or --skip, or compute on the CPU (--device cpu).";
-    Some(GpuError::Unsupported { what: what.into(), cure })
+    (march.method.as_deref() == Some("line-of-sight")).then(|| GpuError::Unsupported {
+        what: "the march line-of-sight".into(),
+        cure: "Omit --march, or compute on the CPU (--device cpu).",
+    })
 }
 
 /// A march that only its name selects.

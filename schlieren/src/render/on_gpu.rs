@@ -4,7 +4,7 @@
 use super::device_march::{self, DeviceMarch};
 use super::planned::PlannedPaths;
 #[cfg(feature = "gpu")]
-use super::planned::described;
+use super::planned::{described, skipping_has_no_effect};
 use super::section::Caches;
 use super::{RenderError, Report};
 use crate::field::Field;
@@ -58,7 +58,7 @@ pub(super) fn on_gpu<'a>(
     measured_rays: Option<usize>,
     caches: &Caches,
 ) -> Result<Result<PlannedPaths<'a>, Option<String>>, RenderError> {
-    use crate::gpu::{Gpu, GpuError, GpuOptions, GpuPaths};
+    use crate::gpu::{Gpu, GpuError, GpuOptions, GpuPaths, Method};
     use crate::plan::{Mode, Plan};
     use std::sync::Arc;
 
@@ -96,6 +96,8 @@ pub(super) fn on_gpu<'a>(
             step_voxels: chosen.step_voxels,
             quantities: request.quantities,
             blank: request.blank,
+            skip_rad: if chosen.method == Method::Verlet { request.skip_rad } else { 0.0 },
+            skip_opd_m: request.skip_opd_m,
         };
         // A device that fails while the field is copied to it is reopened, up to a limited number
         // of times.
@@ -122,7 +124,15 @@ pub(super) fn on_gpu<'a>(
     match made {
         Ok((paths, gpu, warning, chosen)) => {
             let DeviceMarch { name, interpolant, step_voxels, bend, achieved, .. } = chosen;
-            let description = described(name, interpolant, step_voxels);
+            let mut description = described(name, interpolant, step_voxels);
+            let mut skip_warning = None;
+            if request.skip_rad > 0.0 {
+                if name == "verlet" {
+                    description += &format!(", skipping at most {:e} rad", request.skip_rad);
+                } else {
+                    skip_warning = Some(skipping_has_no_effect(name));
+                }
+            }
             let paths = Arc::new(paths);
             let mut planned = PlannedPaths::new(
                 Box::new(Arc::clone(&paths)),
@@ -144,6 +154,7 @@ pub(super) fn on_gpu<'a>(
                 );
             }
             planned.warnings.extend(warning);
+            planned.warnings.extend(skip_warning);
             Ok(Ok(planned))
         }
         Err(e) => fallback_reason(march.device, e).map(|why| Err(Some(why))),

@@ -4,7 +4,7 @@
 
 use super::on_cells::{self, Steps};
 use super::on_gpu::on_gpu;
-use super::planned::{Choice, PlannedPaths, described};
+use super::planned::{Choice, PlannedPaths, described, skipping_has_no_effect};
 use super::section::Caches;
 use super::{RenderError, TestSection};
 use crate::field::Field;
@@ -217,18 +217,6 @@ impl TestSection {
         planned.warnings.extend(skip_warning);
         Ok(self.attenuated(scene, line, view, planned)?.in_image_frame(against_light))
     }
-}
-
-/// Warning that skipping has no effect, with the reason.
-fn skipping_has_no_effect(march: &str) -> String {
-    let why = match march {
-        "line-of-sight" => {
-            "the tolerance lets the plan use straight rays, which need no steps through the flow; \
-             force --march verlet to compare"
-        }
-        _ => "the index is so strong that the plan uses the full march, which samples every step",
-    };
-    format!("march.skip_rad has no effect: {why}")
 }
 
 /// A march for comparison.

@@ -103,3 +103,15 @@ pub(super) fn described(name: &str, interpolant: Interpolant, step_voxels: f64) 
         _ => format!("{name}, {interpolant}, steps of {step_voxels} voxel"),
     }
 }
+
+/// Warning that skipping has no effect, with the reason.
+pub(super) fn skipping_has_no_effect(march: &str) -> String {
+    let why = match march {
+        "line-of-sight" => {
+            "the tolerance lets the plan use straight rays, which need no steps through the flow; \
+             force --march verlet to compare"
+        }
+        _ => "the index is so strong that the plan uses the full march, which samples every step",
+    };
+    format!("march.skip_rad has no effect: {why}")
+}

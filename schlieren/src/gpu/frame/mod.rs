@@ -196,8 +196,7 @@ impl GpuPaths<'_> {
         let buffers = 1
             + u32::from(image > 0)
             + u32::from(exposure.solids.is_some())
-            + u32::from(on_device.volume.kinds.is_some())
-            + on_device.volume.values.layout().buffers();
+            + on_device.field_buffers();
         if buffers > on_device.gpu.storage_buffers() {
             return Err(refused(format!(
                 "it takes {buffers} buffers, and a kernel of the device has {}",

@@ -164,6 +164,7 @@ mod tests {
                     march: Kernel {
                         method: Method::ALL[(k % 5) as usize],
                         interpolant: Interpolant::BSpline,
+                        skip: k == 0,
                         opd: technique.needs_opd(),
                         nodes: k & 1 != 0,
                         layout: FieldLayout::Slabs(1),

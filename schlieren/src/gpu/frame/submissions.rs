@@ -117,8 +117,7 @@ impl<'a> FrameOnDevice<'a> {
             .transpose()?;
         paths.work.add_to_device(march.size());
         let mut of_march = vec![(0, march.as_entire_binding())];
-        of_march.extend(on_device.volume.kinds.as_ref().map(|k| (3, k.as_entire_binding())));
-        of_march.extend(on_device.volume.values.bindings());
+        of_march.extend(on_device.field_bindings());
         let mut kernels = Vec::new();
         match job.light {
             Light::Photons { .. } => {
