@@ -21,6 +21,7 @@ pub(crate) mod netcdf;
 pub mod npy;
 pub mod nrrd;
 pub mod obj;
+pub mod obj_pieces;
 mod open;
 pub mod openfoam;
 mod options;
