@@ -564,5 +564,5 @@ fn the_work_of_a_gpu_is_in_the_report() {
     let object: Value = serde_json::from_str(&out).unwrap_or_else(|e| panic!("{e}: {out} {err}"));
     assert_eq!(object["device"]["photons"], object["photons"]["sent"], "{object}");
     // 800 pixels of 4 bytes, the outcomes, and the rays of the margin.
-    assert_eq!(object["device"]["bytes_from_device"], 800 * 4 + 48 + 4096 * 32);
+    assert_eq!(object["device"]["bytes_from_device"], 800 * 4 + 56 + 4096 * 32);
 }

@@ -1,6 +1,5 @@
 //! Bricks of a field on the device, and counts of the steps that rays skip in them.
 
-use super::volume::upload;
 use super::{Gpu, GpuError};
 use crate::field::Field;
 use crate::interpolate::BSpline;
@@ -41,7 +40,7 @@ impl DeviceBricks {
                 cure: "Omit --skip, or compute on the CPU (--device cpu).",
             });
         }
-        let buffer = upload(gpu, bytemuck::cast_slice(&numbers))?;
+        let buffer = gpu.upload(bytemuck::cast_slice(&numbers))?;
         Ok(DeviceBricks { buffer, build_secs: bricks.build_time().as_secs_f64() })
     }
 

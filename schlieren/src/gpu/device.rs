@@ -261,6 +261,19 @@ impl Gpu {
         })
     }
 
+    /// Copies a part of a field to a buffer of its own.
+    pub(super) fn upload(&self, bytes: &[u8]) -> Result<wgpu::Buffer, GpuError> {
+        self.checked(|| {
+            let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
+            let buffer = self.buffer(bytes.len(), usage);
+            for (i, part) in bytes.chunks(UPLOAD_BYTES).enumerate() {
+                self.queue.write_buffer(&buffer, (i * UPLOAD_BYTES) as u64, part);
+                self.queue.submit([]);
+            }
+            buffer
+        })
+    }
+
     /// Binds buffers to the two groups of a kernel.
     pub(super) fn bind(
         &self,

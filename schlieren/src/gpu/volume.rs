@@ -2,7 +2,6 @@
 //! that fit a binding.
 
 use super::bricks::DeviceBricks;
-use super::device::UPLOAD_BYTES;
 use super::kernel::{FIRST_SLAB, FieldLayout};
 use super::rows::{self, Rows};
 use super::{Gpu, GpuError};
@@ -10,7 +9,6 @@ use crate::field::Field;
 use crate::interpolate::{BSpline, Interpolant, TrilinearGradient};
 use crate::march::FieldCache;
 use std::sync::{Arc, Mutex, PoisonError};
-use wgpu::{BufferDescriptor, BufferUsages};
 
 /// Keeps a field on the device for the next image of it. The owner must pass the same field to
 /// every call.
@@ -187,7 +185,7 @@ impl DeviceVolume {
                 (bytes_of(size_of_val(&w[..]) as u64), bytes_of(gpu.binding_bytes()));
             return Err(too_large("the mask", need, available));
         }
-        let kinds = words.map(|w| upload(gpu, bytemuck::cast_slice(&w))).transpose()?;
+        let kinds = words.map(|w| gpu.upload(bytemuck::cast_slice(&w))).transpose()?;
         let of_others = [kinds.as_ref(), bricks.as_ref().map(|b| &b.buffer)]
             .into_iter()
             .flatten()
@@ -212,7 +210,7 @@ impl DeviceVolume {
             .map(|s| {
                 let first = s * layers;
                 let last = (first + layers).min(nz - 1) + halo;
-                upload(gpu, bytemuck::cast_slice(&values[first * layer..last * layer]))
+                gpu.upload(bytemuck::cast_slice(&values[first * layer..last * layer]))
             })
             .collect::<Result<Vec<_>, _>>()?;
         let bytes = of_others + slabs.iter().map(wgpu::Buffer::size).sum::<u64>();
@@ -243,22 +241,6 @@ fn packed(nodes: &[crate::field::Node]) -> Vec<u32> {
         w.iter().enumerate().fold(0, |a, (i, n)| a | (*n as u32) << (2 * i))
     };
     nodes.chunks(16).map(word).collect()
-}
-
-pub(super) fn upload(gpu: &Gpu, bytes: &[u8]) -> Result<wgpu::Buffer, GpuError> {
-    gpu.checked(|| {
-        let buffer = gpu.device.create_buffer(&BufferDescriptor {
-            label: Some("field"),
-            size: bytes.len() as u64,
-            usage: BufferUsages::STORAGE | BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
-        for (i, part) in bytes.chunks(UPLOAD_BYTES).enumerate() {
-            gpu.queue.write_buffer(&buffer, (i * UPLOAD_BYTES) as u64, part);
-            gpu.queue.submit([]);
-        }
-        buffer
-    })
 }
 
 fn bytes_of(bytes: u64) -> String {
