@@ -8,7 +8,7 @@ use crate::tree::{File, files};
 
 /// The members that other programs embed, and the number of their public items that do not appear
 /// yet.
-const NOT_SHOWN: &[(&str, usize)] = &[("composite", 42), ("rt-core", 57), ("schlieren", 125)];
+const NOT_SHOWN: &[(&str, usize)] = &[("composite", 42), ("rt-core", 57), ("schlieren", 124)];
 
 const ITEMS: &[&str] =
     &["fn ", "const fn ", "unsafe fn ", "struct ", "enum ", "trait ", "type ", "const ", "static "];
