@@ -353,7 +353,7 @@ fn a_stored_mesh_has_the_picture_of_the_mesh_in_memory() {
 }
 
 #[test]
-fn pieces_of_stl_ply_and_parallel_files_are_stored_one_after_the_other() {
+fn pieces_of_stl_ply_obj_and_parallel_files_are_stored_one_after_the_other() {
     let dir = tempfile::tempdir().unwrap();
     let of = |name: &str| dir.path().join(name).display().to_string();
     let (mesh, stored) = (ball(), of("ball.rtmesh"));
@@ -386,6 +386,20 @@ fn pieces_of_stl_ply_and_parallel_files_are_stored_one_after_the_other() {
     let said = store(&of("ball.ply"));
     assert_eq!(said["triangles"], 1280);
     assert!(said["attribute_bytes"].as_u64().unwrap() > 0, "{said}");
+
+    let said = store(&of("ball.obj"));
+    assert_eq!(said["triangles"], 1280);
+    // Normals of its vertices, of which pieces say that they have no texture and no material.
+    assert!(said["attribute_bytes"].as_u64().unwrap() > 0, "{said}");
+    for option in ["--isovalue", "--array"] {
+        let of_volume = ["store", &of("ball.stl"), "-o", &stored, option, "3"];
+        refused(&of_volume, [option, "belongs to volumes"]);
+    }
+    std::fs::write(of("bad.obj"), "v 0 0 0\nv 1 0 0\nf 1 2 9\n").unwrap();
+    let refused = bench(&["store", &of("bad.obj"), "-o", &stored]);
+    let text = String::from_utf8_lossy(&refused.stderr).into_owned();
+    let named = ["bad.obj", "line 3", "`9` names no vertex"].iter().all(|part| text.contains(part));
+    assert!(refused.status.code() == Some(1) && named, "{text}");
 
     // Two halves, the second far from the first.
     let mut far = mesh.clone();

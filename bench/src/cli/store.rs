@@ -6,6 +6,7 @@ use super::{StoreArgs, store_isosurface, store_volume};
 use crate::stored_data::{mixing_layer_pieces, wavelet_surfaces};
 use datasets::cli::{Cancel, CommonArgs, CureExt as _, UsageError};
 use datasets::isosurface::Options;
+use datasets::read::obj_pieces::ObjPieces;
 use datasets::read::ply_pieces::PlyPieces;
 use datasets::read::stl_pieces::StlPieces;
 use datasets::read::volume_planes::VolumePlanes;
@@ -87,6 +88,12 @@ fn store_file(
 ) -> anyhow::Result<StoredMeshReport> {
     let named =
         |extension: &str| file.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension));
+    let is_mesh = ["stl", "ply", "obj", "pvtp"].into_iter().any(named);
+    let of_volumes = [("--array", args.array.is_some()), ("--isovalue", args.isovalue.is_some())];
+    if let Some((option, _)) = of_volumes.into_iter().find(|(_, given)| is_mesh && *given) {
+        let file = file.display();
+        return Err(UsageError(format!("{option} belongs to volumes, and {file} is a mesh")).into());
+    }
     let mut job = StoreJob::new(common, args, memory, cancel);
     // A flat image has no isosurface; it is stored as the surface that it is.
     let planes = VolumePlanes::open(file)?.filter(|p| p.layout().dims.min_element() >= 2);
@@ -109,6 +116,29 @@ fn store_file(
         while let Some(piece) = pieces.next() {
             job.add_file(file, &piece?, Some(origin))?;
             bar.set_position(pieces.faces_read());
+        }
+    } else if named("obj") && args.color_by.is_none() {
+        let mut pieces = ObjPieces::open(file, PIECE)?;
+        let (bar, contents) = (common.progress(pieces.faces(), "storing"), pieces.contents());
+        if job.keeps_attributes() && contents.materials {
+            job.warn_once("materials are not stored, but colours of vertices are".into());
+        }
+        if job.keeps_attributes() && contents.texcoords {
+            job.warn_once("texture coordinates are not stored".into());
+        }
+        if contents.points_and_lines > 0 {
+            let count = contents.points_and_lines;
+            job.warn_once(format!("{count} points and lines left out: only faces are read"));
+        }
+        while let Some(piece) = pieces.next() {
+            job.add(&piece?)?;
+            bar.set_position(pieces.faces_read());
+        }
+        if pieces.fanned() > 0 {
+            let count = pieces.fanned();
+            job.warn_once(format!(
+                "{count} faces cross themselves or are too large, and were divided as a fan"
+            ));
         }
     } else if named("pvtp")
         && let Some(PieceFiles { files, .. }) = piece_files(file)?
