@@ -182,7 +182,10 @@ impl<P: Composite> Compositor<P> {
         let size_px = (frame.width_px(), frame.height_px());
         let may_share = options.in_memory
             && matches!(options.strategy, Strategy::DirectSend | Strategy::Automatic);
-        let groups = if may_share { machine_groups::by_machine::<P>(comm, &order) } else { None };
+        let groups = match may_share {
+            true => machine_groups::by_machine::<P>(comm, &order.ranks, order.root_index),
+            false => None,
+        };
         let is_one_group = groups.as_ref().is_some_and(|groups| groups.len() == 1);
         if options.strategy == Strategy::Automatic && self.network.is_none() && !is_one_group {
             self.network = Some(NetworkCosts::measure(comm, options.timeout)?);

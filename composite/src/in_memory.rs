@@ -157,8 +157,8 @@ impl<'a, P: Composite> Merging<'a, P> {
 }
 
 /// The image at the leader of the group, of which the given rows are merged; returns after a
-/// barrier of the machine. The outer `None` is returned on all ranks of the machine if there was not
-/// enough memory.
+/// barrier of the machine. The outer `None` is returned on all ranks of the machine if there was
+/// not enough memory.
 pub(crate) fn run<P: Composite>(
     exchange: &mut FrameExchange<'_>,
     merging: &Merging<'_, P>,

@@ -6,7 +6,6 @@
 //! parallel volume rendering using 2-3 swap image compositing", 2008, and of TOD-Tree, for
 //! processes.)
 use crate::comm::Communicator;
-use crate::compositor::CompositingOrder;
 use crate::network_costs::{LOCAL_BYTE_SECS, LOCAL_MESSAGE_SECS, NetworkCosts};
 use crate::pixel::{Composite, PixelFormat};
 use crate::rect::Rect;
@@ -29,14 +28,15 @@ impl MachineGroup {
 }
 
 /// The machines in the order of compositing, if their ranks share memory and merging them first
-/// does not change a bit of the image. The same on all ranks.
+/// does not change a bit of the image. `order` has the ranks, of which the one at `root` gets the
+/// image. The same on all ranks.
 pub(crate) fn by_machine<P: PixelFormat>(
     comm: &dyn Communicator,
-    order: &CompositingOrder,
+    order: &[usize],
+    root: Option<usize>,
 ) -> Option<Vec<MachineGroup>> {
-    let root = order.root_index?;
     let machines = comm.machines_with_shared_memory()?;
-    let groups = groups_of(&order.ranks, machines, root)?;
+    let groups = groups_of(order, machines, root?)?;
     (P::HAS_DEPTH || keeps_grouping(&groups)).then_some(groups)
 }
 

@@ -455,9 +455,9 @@ fn ranks_of_two_machines_do_not_believe_that_they_share_one() {
 fn machines_with_several_ranks_merge_in_their_memories_first() {
     let (openmpi, mpich) =
         (("RTSV_MPIRUN", "OMPI_COMM_WORLD_RANK"), ("RTSV_MPIRUN_MPICH", "PMI_RANK"));
-    // 12 images with depth and 12 blended ones are in the order of ranks. Of these, one or the other
-    // is the first that needs more shared memory, and is sent; those in the order of their scene
-    // may be merged by machines too.
+    // 12 images with depth and 12 blended ones are in the order of ranks. Of these, one or the
+    // other is the first that needs more shared memory, and is sent; those in the order of their
+    // scene may be merged by machines too.
     for ((variable, rank), count, machine, machines, least_merged) in [
         (openmpi, "8", "/2", 4, 18),
         (openmpi, "8", "/4", 2, 18),

@@ -23,9 +23,9 @@ use std::marker::PhantomData;
 
 /// A shape whose primitives take many rays at once.
 pub(super) trait PacketShape: Shape {
-    /// At most sixteen blocks through primitive `prim`; lanes whose ranges are empty hit nothing. The
-    /// hits are those of [`Shape::closest`]. `hits` has none yet, and gets any number of a primitive
-    /// where there is one.
+    /// At most sixteen blocks through primitive `prim`; lanes whose ranges are empty hit nothing.
+    /// The hits are those of [`Shape::closest`]. `hits` has none yet, and gets any number of a
+    /// primitive where there is one.
     fn trace<S: Simd, Q: HitQuery>(
         &self,
         simd: S,

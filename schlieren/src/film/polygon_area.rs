@@ -1,8 +1,8 @@
-//! Shares of a triangle in pixels by cutting it: of any size, also where it is so thin that its area
-//! is small against the rounding of its coordinates.
+//! Shares of a triangle in pixels by cutting it: of any size, also where it is so thin that its
+//! area is small against the rounding of its coordinates.
 
-/// Calls `add` with each pixel of a film of this size that has a part of the triangle, and its share
-/// of `area`, the triangle's.
+/// Calls `add` with each pixel of a film of this size that has a part of the triangle, and its
+/// share of `area`, the triangle's.
 pub(super) fn polygon_in_pixels(
     points: &[[f64; 2]; 3],
     area: f64,
@@ -55,9 +55,9 @@ impl Polygon {
         &self.corners[..self.len]
     }
 
-    /// Clips by a line across `axis` (Sutherland and Hodgman 1974): keeps the part above `limit` for
-    /// `side` = 1, the part below for -1. Where light is hardly bent, most triangles lie within one
-    /// pixel, so most clips end at the first two questions.
+    /// Clips by a line across `axis` (Sutherland and Hodgman 1974): keeps the part above `limit`
+    /// for `side` = 1, the part below for -1. Most clips of a large triangle's row keep all of it
+    /// or nothing, and end at the first two questions.
     #[inline(always)]
     fn clip(&mut self, axis: usize, limit: f64, side: f64) {
         let len = self.len.min(8);

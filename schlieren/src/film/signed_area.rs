@@ -13,9 +13,9 @@ const MOST: usize = 3;
 /// 1e-13 of the triangle.
 const LEAST_AREA: f64 = 1e-3;
 
-/// Calls `add` with each pixel of a film of this size that has a part of the triangle, and its share
-/// of `area`, the triangle's. Returns false, and calls nothing, for a triangle that is too large or
-/// has too little area.
+/// Calls `add` with each pixel of a film of this size that has a part of the triangle, and its
+/// share of `area`, the triangle's. Returns false, and calls nothing, for a triangle that is too
+/// large or has too little area.
 pub(super) fn small_triangle_in_pixels(
     points: &[[f64; 2]; 3],
     area: f64,

@@ -96,6 +96,22 @@ pub(super) fn numbered_nodes(ids: &[Vec<u8>]) -> Vec<usize> {
 }
 
 impl super::MpiComm {
+    /// The machine of every rank, numbered in the order of their first ranks. Ranks count as
+    /// separate unless MPI or the system says that they share a machine. The same on all ranks.
+    pub fn nodes(&self) -> &[usize] {
+        &self.nodes
+    }
+
+    /// The name of the machine this rank runs on.
+    pub fn processor_name(&self) -> String {
+        let mut text = vec![0_u8; 4096];
+        let mut length: c_int = 0;
+        // SAFETY: the buffer is longer than MPI_MAX_PROCESSOR_NAME of every ABI (256 at most).
+        unsafe { (self.mpi.functions.processor_name)(text.as_mut_ptr().cast(), &raw mut length) };
+        text.truncate(usize::try_from(length).unwrap_or(0));
+        String::from_utf8_lossy(&text).trim_end_matches('\0').to_string()
+    }
+
     /// Finds out which ranks share a machine.
     pub(super) fn find_nodes(&mut self) -> Result<(), super::CommError> {
         let mine =
