@@ -378,9 +378,9 @@ fn pieces_of_stl_ply_obj_and_parallel_files_are_stored_one_after_the_other() {
     assert!(text.contains("--normal-tolerance has no effect"), "{text}");
     // Cut, it is no binary file any more, and the reader of whole files says what is wrong.
     std::fs::write(of("cut.stl"), &stl[..5000]).unwrap();
-    let refused = bench(&["store", &of("cut.stl"), "-o", &stored]);
-    let text = String::from_utf8_lossy(&refused.stderr).into_owned();
-    assert!(refused.status.code() == Some(1) && text.contains("cut.stl"), "{text}");
+    let cut = bench(&["store", &of("cut.stl"), "-o", &stored]);
+    let text = String::from_utf8_lossy(&cut.stderr).into_owned();
+    assert!(cut.status.code() == Some(1) && text.contains("cut.stl"), "{text}");
 
     files(dir.path());
     let said = store(&of("ball.ply"));
