@@ -50,9 +50,10 @@ pub struct Options {
     /// Whether ranks that are processes of one machine merge the image in shared memory, if the
     /// strategy is [`Strategy::DirectSend`] or [`Strategy::Automatic`] and the image goes to one
     /// rank. With several machines each merges what its ranks drew, and one rank of each sends
-    /// that on; for this, ranks of a machine must be neighbours in the order, and for premultiplied
-    /// colours all machines must have equally many ranks and both numbers be powers of two.
-    /// [`Strategy::Automatic`] does so only where its model finds it faster. Otherwise, and where there is no such memory, all ranks send messages.
+    /// that on; for this, ranks of a machine must be neighbours in the order, and for
+    /// premultiplied colours all machines must have equally many ranks and both numbers be powers
+    /// of two. [`Strategy::Automatic`] does so only where its model finds it faster. Otherwise, and
+    /// where there is no such memory, all ranks send messages.
     pub in_memory: bool,
     /// The instruction set; `None` is the best this machine has. Changes the time, never the image.
     pub simd: Option<SimdLevel>,

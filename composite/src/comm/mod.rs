@@ -63,8 +63,8 @@ pub trait SharedSegments {
     /// Makes this rank's segment at least `bytes` long, where there is memory for it.
     fn reserve(&mut self, bytes: usize);
 
-    /// Length of this rank's segment now: a [`publish`](Self::publish) of so many bytes finds enough
-    /// memory.
+    /// Length of this rank's segment now: a [`publish`](Self::publish) of so many bytes finds
+    /// enough memory.
     fn reserved(&self) -> usize;
 
     /// Opens the segments of all ranks of the machine. Returns false on all of them if any segment

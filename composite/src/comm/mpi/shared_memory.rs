@@ -42,8 +42,8 @@ const REFUSED: usize = 5;
 /// The collective call after which its segment was last written.
 const PUBLISHED: usize = 6;
 
-/// Where the table is: process and file of the machine's first rank, and a nonce in the table, so that a process with
-/// the same number in another container is not mistaken for it.
+/// Where the table is: process and file of the machine's first rank, and a nonce in the table, so
+/// that a process with the same number in another container is not mistaken for it.
 pub(super) type Address = [u32; 3];
 
 struct Mapping {
