@@ -43,10 +43,8 @@ fn for_comparison(name: &str) -> Option<(&'static str, Method, Bend)> {
 }
 
 impl DeviceMarch {
-    /// The march that a scene names, or that follows from its plan.
-    ///
-    /// # Errors
-    /// If the GPU has no kernel for it.
+    /// The march that a scene names, or that follows from its plan. What has no kernel was refused
+    /// before ([`unsupported`]).
     pub(super) fn new(
         march: &MarchSpec,
         plan: Plan,
