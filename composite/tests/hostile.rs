@@ -38,7 +38,7 @@ type Ended = (Result<(), CompositeError>, usize);
 /// `rect` instead of the rectangle where it drew.
 fn with_rect(rect: [u32; 4], options: &Options) -> Vec<Ended> {
     let lie = move |number: usize, message: &mut Vec<u8>| {
-        if number == 0 && message.len() == 32 {
+        if number == 0 && message.len() == 36 {
             for (to, corner) in message[8..24].chunks_exact_mut(4).zip(rect) {
                 to.copy_from_slice(&corner.to_le_bytes());
             }
