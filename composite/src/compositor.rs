@@ -49,11 +49,11 @@ pub struct Options {
     pub slice_px: Option<usize>,
     /// Whether ranks that are processes of one machine merge the image in shared memory, if the
     /// strategy is [`Strategy::DirectSend`] or [`Strategy::Automatic`] and the image goes to one
-    /// rank. With several machines each merges what its ranks drew, and one rank of each sends
-    /// that on; for this, ranks of a machine must be neighbours in the order, and for
-    /// premultiplied colours all machines must have equally many ranks and both numbers be powers
-    /// of two. [`Strategy::Automatic`] does so only where its model finds it faster. Otherwise, and
-    /// where there is no such memory, all ranks send messages.
+    /// rank. Where they are on several machines and [`Strategy::Automatic`] finds it faster, each
+    /// machine merges what its ranks drew, and one rank of each sends that on; for this, ranks of a
+    /// machine must be neighbours in the order, and for premultiplied colours all machines must
+    /// have equally many ranks and both numbers be powers of two. Otherwise, and where there is no
+    /// such memory, all ranks send messages.
     pub in_memory: bool,
     /// The instruction set; `None` is the best this machine has. Changes the time, never the image.
     pub simd: Option<SimdLevel>,
@@ -217,10 +217,11 @@ impl<P: Composite> Compositor<P> {
         let groups =
             groups.filter(|groups| in_memory::is_possible::<P>(&mut exchange, size_px, groups));
         let groups = groups.filter(|groups| match (options.strategy, &self.network) {
-            (Strategy::Automatic, Some(network)) if groups.len() > 1 => {
+            _ if is_one_group => true,
+            (Strategy::Automatic, Some(network)) => {
                 machine_groups::pays::<P>(groups, network, &exchange.drawn, true)
             }
-            _ => true,
+            _ => false,
         });
         let mut view = frame.view(drawn);
         let mut machine_image = None;

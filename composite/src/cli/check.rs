@@ -1,10 +1,10 @@
 //! `composite check`: does every strategy give the bits of the serial reference over this machine's
 //! transport? For tests it also injects faults.
 use super::first_ranks::FirstRanks;
-use super::hard_cases;
+use super::hard_cases::{self, SLOW};
 use super::ranks::{RankArgs, RankComm};
 use crate::comm::Communicator;
-use crate::compositor::{Options, composite};
+use crate::compositor::{Compositor, Options, composite};
 use crate::frame::Frame;
 use crate::pixel::{Composite, DepthPixel, PremultipliedPixel};
 use crate::reference::composite_serial;
@@ -134,10 +134,10 @@ pub(super) fn check(
                         if group.shared_segments().is_some() {
                             all.push(options(Strategy::DirectSend, false, order));
                             // In the order of ranks, in which those of a machine are neighbours.
-                            all.push(options(Strategy::DirectSend, true, None));
+                            all.push(options(Strategy::Automatic, true, None));
                         }
                         for options in all {
-                            for image in one_frame(&mut group, scene, size_px, &options)? {
+                            for image in one_frame(&mut group, scene, size_px, options)? {
                                 images += 1;
                                 images_differ += u64::from(!image.same);
                                 merged_by_machine += u64::from(image.machines > 1);
@@ -161,6 +161,10 @@ pub(super) fn check(
                         let direct = [Strategy::DirectSend];
                         let [all, differ] =
                             hard_cases::run(&mut group, &direct, false, most, 1, timeout)?;
+                        hard = [hard[0] + all, hard[1] + differ];
+                        let automatic = [Strategy::Automatic];
+                        let [all, differ] =
+                            hard_cases::run(&mut group, &automatic, true, most, 1, timeout)?;
                         hard = [hard[0] + all, hard[1] + differ];
                     }
                 }
@@ -225,7 +229,7 @@ fn one_frame(
     comm: &mut dyn Communicator,
     scene: Workload,
     (width_px, height_px): (u32, u32),
-    options: &Options,
+    options: Options,
 ) -> anyhow::Result<Vec<CheckedImage>> {
     let (rank, ranks) = (comm.rank(), comm.size());
     let draw = |rank: usize| {
@@ -246,9 +250,9 @@ fn one_frame(
         &drawn.colors,
         &drawn.depths,
     )?;
-    let depth = composite(comm, &frame, options)?;
+    let depth = Compositor::new(options.clone()).with_network(SLOW).composite(comm, &frame)?;
     let frame = Frame::<PremultipliedPixel<[f32; 4]>>::premultiplied(width_px, height_px, &glass)?;
-    let blend = composite(comm, &frame, options)?;
+    let blend = Compositor::new(options).with_network(SLOW).composite(comm, &frame)?;
 
     let mut images = Vec::new();
     let mut found = |same, machines| images.push(CheckedImage { same, machines });

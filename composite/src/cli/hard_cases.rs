@@ -5,10 +5,16 @@ use crate::compositor::{Compositor, Options};
 use crate::error::CompositeError;
 use crate::frame::Frame;
 use crate::mix64::mix64;
+use crate::network_costs::NetworkCosts;
 use crate::pixel::{Composite, DepthPixel, PremultipliedPixel};
 use crate::reference::composite_serial;
 use crate::strategies::Strategy;
 use std::time::Duration;
+
+/// A network on which it pays to send as little as possible: with the automatic strategy, machines
+/// merge first where they can.
+pub(super) const SLOW: NetworkCosts =
+    NetworkCosts { latency_secs: 2e-3, overhead_secs: 1e-3, byte_secs: 1e-8 };
 
 /// What each rank draws.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -98,8 +104,10 @@ pub(super) fn run(
         ..Options::default()
     };
     for strategy in strategies {
-        let mut depth = Compositor::<DepthPixel<[u8; 4]>>::new(options(*strategy));
-        let mut blend = Compositor::<PremultipliedPixel<[f32; 4]>>::new(options(*strategy));
+        let mut depth =
+            Compositor::<DepthPixel<[u8; 4]>>::new(options(*strategy)).with_network(SLOW);
+        let mut blend =
+            Compositor::<PremultipliedPixel<[f32; 4]>>::new(options(*strategy)).with_network(SLOW);
         for case in cases {
             for (w, h) in case.sizes(comm.size(), most) {
                 let pixels = (w * h) as usize;
