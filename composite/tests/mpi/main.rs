@@ -469,7 +469,7 @@ fn machines_with_several_ranks_merge_in_their_memories_first() {
     ] {
         let Some(mpirun) = peer(variable) else { continue };
         let environment = format!("COMPOSITE_NODE=of-$(({rank}{machine}))");
-        let hard = ["--hard", "--repeats", "50"];
+        let hard = ["--hard", "--repeats", "10"];
         let ran = launched(&mpirun, &[], &["-n", count], &[&environment], &hard);
         let what = format!("{variable} {count} ranks {machine}: {}", ran.text);
         assert_eq!(nodes_and_images(&ran), (machines, 168), "{what}");

@@ -343,8 +343,10 @@ mod tests {
         (dir, path)
     }
 
-    /// Corners, normals and colours of each triangle.
-    fn triangles(mesh: &TriMesh) -> Vec<[(DVec3, Option<Vec3>, [f32; 4]); 3]> {
+    /// Position, normal and colour.
+    type Corner = (DVec3, Option<Vec3>, [f32; 4]);
+
+    fn triangles(mesh: &TriMesh) -> Vec<[Corner; 3]> {
         let colors = &mesh.colors.as_ref().expect("colours").values;
         let corner = |k: u32| {
             let k = k as usize;
