@@ -1,10 +1,9 @@
 //! Ranks on several machines, several on each: those of one machine merge in its memory first, and
 //! one of each sends the result to the other machines.
 //!
-//! This sends what a machine shows instead of what each of its ranks drew, in the square of the
-//! number of ranks a machine fewer messages. (The two levels of Wang, Yu and Ma, "Massively
-//! parallel volume rendering using 2-3 swap image compositing", 2008, and of TOD-Tree, for
-//! processes.)
+//! So a machine sends each pixel once, and with k ranks on each machine there are k² times fewer
+//! messages. (Howison, Bethel and Childs, "MPI-hybrid parallelism for volume rendering on large,
+//! multi-core systems", EGPGV 2010, measured this with threads in place of processes.)
 use crate::comm::Communicator;
 use crate::network_costs::{LOCAL_BYTE_SECS, LOCAL_MESSAGE_SECS, NetworkCosts};
 use crate::pixel::{Composite, PixelFormat};
@@ -48,9 +47,7 @@ pub(crate) fn pays<P: Composite>(
     drawn: &[Rect],
     root: bool,
 ) -> bool {
-    let secs = |network: &NetworkCosts, drawn: &[Rect], root| {
-        network.estimate_secs::<P>(network.choose::<P>(drawn, root), drawn, root)
-    };
+    let secs = |network: &NetworkCosts, drawn: &[Rect], root| network.best::<P>(drawn, root).1;
     // The ranks of a machine share its wire, except for the image, which one rank collects.
     let ranks = groups.iter().map(|group| group.members.len()).max().unwrap_or(1);
     let shared = NetworkCosts { byte_secs: network.byte_secs * ranks as f64, ..*network };

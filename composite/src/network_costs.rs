@@ -211,6 +211,11 @@ impl NetworkCosts {
 
     /// The strategy with the smallest estimate.
     pub(crate) fn choose<P: Composite>(&self, drawn: &[Rect], root: bool) -> Strategy {
+        self.best::<P>(drawn, root).0
+    }
+
+    /// The strategy with the smallest estimate, and that, in seconds.
+    pub(crate) fn best<P: Composite>(&self, drawn: &[Rect], root: bool) -> (Strategy, f64) {
         let mut best =
             (Strategy::DirectSend, self.estimate_secs::<P>(Strategy::DirectSend, drawn, root));
         for strategy in [
@@ -224,7 +229,7 @@ impl NetworkCosts {
                 best = (strategy, secs);
             }
         }
-        best.0
+        best
     }
 
     /// Seconds of a round of `messages` with `bytes`. The bytes of the first message are encoded

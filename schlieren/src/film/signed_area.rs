@@ -2,8 +2,8 @@
 //!
 //! To the right of an edge that goes up, each row of pixels gains as much area as the edge is high
 //! there, to the right of one that goes down it loses as much. What remains is inside. So a walk
-//! along three edges gives the areas in all pixels, without cutting polygons, in a third to a half
-//! of the time. (Rasterizers of fonts work so: FreeType's `ftgrays`, after R. Levien's libart.)
+//! along three edges gives the areas in all pixels, without cutting polygons. (Rasterizers of fonts
+//! work so: FreeType's `ftgrays`, after R. Levien's libart.)
 
 /// Most columns and rows of pixels around the triangle. Where light is bent by less than a pixel
 /// from one ray to the next, it has two or three.
