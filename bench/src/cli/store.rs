@@ -126,6 +126,9 @@ fn store_file(
         if job.keeps_attributes() && contents.texcoords {
             job.warn_once("texture coordinates are not stored".into());
         }
+        if job.keeps_attributes() && contents.colors_of_some {
+            job.warn_once("colours are not stored: some vertices have none".into());
+        }
         if contents.points_and_lines > 0 {
             let count = contents.points_and_lines;
             job.warn_once(format!("{count} points and lines left out: only faces are read"));

@@ -57,6 +57,8 @@ pub struct ObjContents {
     pub materials: bool,
     /// Vertices have texture coordinates.
     pub texcoords: bool,
+    /// Some vertices have colours and some have none: no colours are read.
+    pub colors_of_some: bool,
     /// Points and lines.
     pub points_and_lines: u64,
 }
@@ -170,6 +172,7 @@ impl ObjPieces {
             }
         }
         if self.colors.len() != self.positions.len() {
+            self.contents.colors_of_some = !self.colors.is_empty();
             self.colors = Vec::new();
         }
         Ok(())
@@ -381,8 +384,15 @@ mod tests {
              usemtl a\nf 1/1/1 2/1/1 3/1/1\nf 1/1 2/1 3/1\nf 1 2\n",
         );
         let mut pieces = ObjPieces::open(&path, 1).unwrap();
-        let expected = ObjContents { materials: true, texcoords: true, points_and_lines: 2 };
+        let expected = ObjContents {
+            materials: true,
+            texcoords: true,
+            colors_of_some: false,
+            points_and_lines: 2,
+        };
         assert_eq!(pieces.contents(), expected);
+        let (_dir, some) = written("v 0 0 0 1 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+        assert!(ObjPieces::open(&some, 1).unwrap().contents().colors_of_some);
         let first = pieces.next().unwrap().unwrap();
         assert!(first.normals.is_some() && first.colors.is_none());
         assert!(pieces.next().unwrap().unwrap().normals.is_none());
