@@ -4,7 +4,7 @@
 //! Coefficients are f32 in memory already. Values are taken relative to the first corner's, and
 //! places to its place, so that f32 keeps the digits of differences.
 
-use crate::resample::reconstruct::{Expansion, TERMS};
+use crate::resample::reconstruct::{Expansion, FACTOR_FALL, TERMS, UNRESOLVED, factors};
 use glam::DVec3;
 
 /// Corners that are evaluated at once.
@@ -33,13 +33,14 @@ pub(super) fn set(shares: &mut [Share], i: usize, n: f64, gradient: DVec3) {
     }
 }
 
-/// The powers that are used of each polynomial.
+/// How the polynomials of a cell's corners are joined.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Degree {
-    /// All.
-    Third,
-    /// Those up to the second degree ([`Expansion::parts_to_second_degree`]).
-    Second,
+pub(super) enum Mean {
+    /// With [`factors`] for their terms, if the shares of the corners allow it.
+    Exact,
+    /// Of the polynomials themselves, which is less accurate, and with another part of those that
+    /// are not whole ([`UNRESOLVED`]).
+    Plain,
 }
 
 /// What a corner contributes.
@@ -58,6 +59,8 @@ pub(super) struct Polynomials {
     /// The first corner's value.
     value: f64,
     linear: bool,
+    /// Whether factors change from place to place: some polynomials are whole.
+    mixed: bool,
 }
 
 /// Those of four corners: a lane for each.
@@ -65,6 +68,8 @@ pub(super) struct Polynomials {
 struct Group {
     place: [Lane; 3],
     value: Lane,
+    /// 1 for whole polynomials.
+    whole: Lane,
     frame: [Lane; 6],
     constant: Lane,
     terms: [Lane; TERMS],
@@ -78,6 +83,7 @@ struct Group {
 const EMPTY: Group = Group {
     place: [ZERO; 3],
     value: ZERO,
+    whole: ZERO,
     frame: [ZERO; 6],
     constant: ZERO,
     terms: [ZERO; TERMS],
@@ -88,14 +94,23 @@ const EMPTY: Group = Group {
 };
 
 impl Polynomials {
+    /// `of_element` tells whether the shares will be those of an element.
     pub(super) fn prepare<'a>(
         &mut self,
-        corners: impl ExactSizeIterator<Item = Corner<'a>>,
-        degree: Degree,
+        corners: impl ExactSizeIterator<Item = Corner<'a>> + Clone,
+        of_element: bool,
+        mean: Mean,
     ) {
         self.groups.clear();
         self.groups.resize(corners.len().div_ceil(LANES), EMPTY);
         self.linear = true;
+        let is_whole = |c: &Corner<'_>| c.expansion.is_some_and(Expansion::is_whole);
+        let whole = match mean == Mean::Exact && of_element {
+            true => corners.clone().filter(is_whole).count(),
+            false => 0,
+        };
+        self.mixed = whole > 0 && whole < corners.len();
+        let factors = factors(f64::from(u8::from(whole == corners.len()))).map(|f| f as f32);
         for (i, corner) in corners.enumerate() {
             if i == 0 {
                 self.value = corner.value;
@@ -105,17 +120,18 @@ impl Polynomials {
                 group.place[a][l] = corner.place[a] as f32;
             }
             group.value[l] = (corner.value - self.value) as f32;
+            group.whole[l] = f32::from(u8::from(is_whole(&corner)));
             let Some(expansion) = corner.expansion else { continue };
             self.linear = false;
-            let parts = match degree {
-                Degree::Third => expansion.parts(),
-                Degree::Second => expansion.parts_to_second_degree(),
-            };
+            let mut parts = expansion.parts();
+            if mean == Mean::Plain && !expansion.is_whole() {
+                parts = parts.times((1.0 - UNRESOLVED) as f32);
+            }
             for (lane, f) in group.frame.iter_mut().zip(parts.frame) {
                 lane[l] = f;
             }
-            for (lane, c) in group.terms.iter_mut().zip(parts.terms) {
-                lane[l] = c;
+            for (n, (lane, c)) in group.terms.iter_mut().zip(parts.terms).enumerate() {
+                lane[l] = factors[degree_of(n) - 1] * c;
             }
             group.constant[l] = parts.constant;
             let bounds = parts.bounds;
@@ -128,14 +144,52 @@ impl Polynomials {
     /// The value and its gradient at `at`, relative to the cell's origin.
     pub(super) fn blend(&self, at: DVec3, shares: &[Share]) -> (f64, DVec3) {
         let at = at.to_array().map(|x| x as f32);
+        if self.mixed {
+            return self.blend_mixed(at, shares);
+        }
         let mut sum = [0.0f64; 4];
         for (group, share) in self.groups.iter().zip(shares) {
-            let lanes = if self.linear { group.linear(share) } else { group.cubic(at, share) };
+            let lanes = match self.linear {
+                true => group.linear(share),
+                false => group.cubic(at, share, [1.0; 3]).0,
+            };
             for (s, lane) in sum.iter_mut().zip(lanes) {
                 *s += f64::from(total(lane));
             }
         }
         (self.value + sum[0], DVec3::new(sum[1], sum[2], sum[3]))
+    }
+
+    /// As [`Polynomials::blend`] where factors change: ∇f also has a part along their gradient.
+    fn blend_mixed(&self, at: [f32; 3], shares: &[Share]) -> (f64, DVec3) {
+        let (mut whole, mut slope) = (0.0f64, DVec3::ZERO);
+        for (group, share) in self.groups.iter().zip(shares) {
+            let of = |n: &Lane| {
+                let lanes = [0, 1, 2, 3].map(|l| n[l] * group.whole[l]);
+                f64::from(total(lanes))
+            };
+            whole += of(&share.n);
+            slope += DVec3::from([0, 1, 2].map(|a| of(&share.gradient[a])));
+        }
+        let factors = factors(whole).map(|f| f as f32);
+        let (mut sum, mut by_whole) = ([0.0f64; 4], 0.0);
+        for (group, share) in self.groups.iter().zip(shares) {
+            let (lanes, more) = group.cubic(at, share, factors);
+            for (s, lane) in sum.iter_mut().zip(lanes) {
+                *s += f64::from(total(lane));
+            }
+            by_whole += f64::from(total(more));
+        }
+        (self.value + sum[0], DVec3::new(sum[1], sum[2], sum[3]) + by_whole * slope)
+    }
+}
+
+/// The degree of a monomial in the order of `polynomial::monomials`.
+fn degree_of(term: usize) -> usize {
+    match term {
+        0..3 => 1,
+        3..9 => 2,
+        _ => 3,
     }
 }
 
@@ -155,11 +209,13 @@ impl Group {
         out
     }
 
-    /// Terms in the order of `polynomial::monomials`.
-    #[inline]
-    fn cubic(&self, at: [f32; 3], share: &Share) -> [Lane; 4] {
+    /// Value and gradient with factors for the terms of each degree, and the derivative of the value
+    /// by the share of whole corners, which makes the factors. Terms are in the order of
+    /// `polynomial::monomials`.
+    #[inline(always)]
+    fn cubic(&self, at: [f32; 3], share: &Share, [f1, f2, f3]: [f32; 3]) -> ([Lane; 4], Lane) {
         let (f, c) = (&self.frame, &self.terms);
-        let mut out = [ZERO; 4];
+        let (mut out, mut by_whole) = ([ZERO; 4], ZERO);
         for l in 0..LANES {
             let d = [0, 1, 2].map(|a| at[a] - self.place[a][l]);
             let x = f[0][l] * d[0];
@@ -182,22 +238,27 @@ impl Group {
             let kz = k2 * xx + k4 * xy + 2.0 * (k5 * xz + k8 * yz) + k7 * yy + 3.0 * k9 * zz;
             // Euler: x·∇p = degree · p for each degree.
             let first = c[0][l] * x + c[1][l] * y + c[2][l] * z;
-            let second = 0.5 * (x * hx + y * hy + z * hz);
-            let third = (1.0 / 3.0) * (x * kx + y * ky + z * kz);
-            let change = self.constant[l] + ((third + second) + first);
+            let second = x * hx + y * hy + z * hz;
+            let third = x * kx + y * ky + z * kz;
+            let all = (f3 / 3.0) * third + (0.5 * f2) * second + f1 * first;
+            let change = self.constant[l] + all;
             let within = change.max(self.low[l]).min(self.high[l]);
             let beyond = (change - within).max(-self.reach[l]).min(self.reach[l]);
             let less = self.fall[l] * beyond.abs();
             let change = within + (beyond - less * beyond);
             let free = share.n[l] * (1.0 - 2.0 * less);
-            let (gx, gy, gz) = (c[0][l] + hx + kx, c[1][l] + hy + ky, c[2][l] + hz + kz);
+            let gx = f1 * c[0][l] + f2 * hx + f3 * kx;
+            let gy = f1 * c[1][l] + f2 * hy + f3 * ky;
+            let gz = f1 * c[2][l] + f2 * hz + f3 * kz;
             let value = self.value[l] + change;
             out[0][l] = share.n[l] * value;
             out[1][l] =
                 share.gradient[0][l] * value + free * (f[0][l] * gx + f[1][l] * gy + f[3][l] * gz);
             out[2][l] = share.gradient[1][l] * value + free * (f[2][l] * gy + f[4][l] * gz);
             out[3][l] = share.gradient[2][l] * value + free * (f[5][l] * gz);
+            // A term of degree k falls by k times this.
+            by_whole[l] = -(FACTOR_FALL as f32) * free * (first + second + third);
         }
-        out
+        (out, by_whole)
     }
 }

@@ -1,6 +1,6 @@
 //! One cell, prepared for lines: where they leave it, and over which face.
 
-use super::blend::{Corner, Degree, Polynomials};
+use super::blend::{Corner, Mean, Polynomials};
 use super::border::{each_triangle, line_through, normal_and_middle};
 use super::shares::Map;
 use super::{CellField, Kind};
@@ -67,7 +67,7 @@ struct Ways {
 
 impl PreparedCell {
     /// Prepares a cell in place of another.
-    pub(super) fn prepare(&mut self, field: &CellField, cell: usize, degree: Degree) {
+    pub(super) fn prepare(&mut self, field: &CellField, cell: usize, mean: Mean) {
         let corners = field.mesh.corners(cell);
         let place = |&i: &u32| field.mesh.point(i as usize);
         self.origin = place(&corners.ids[0]);
@@ -109,7 +109,9 @@ impl PreparedCell {
             value: field.values[id as usize],
             expansion: field.expansions.get(id as usize),
         };
-        self.polynomials.prepare(corners.ids.iter().zip(&self.corners).map(corner), degree);
+        let of_element = shares == Shares::OfElement;
+        let corners = corners.ids.iter().zip(&self.corners).map(corner);
+        self.polynomials.prepare(corners, of_element, mean);
     }
 
     /// The distance from `at` along `direction` to where a line leaves the cell, and what lies

@@ -35,7 +35,7 @@ use super::reconstruct::{Expansion, FitQuality, PointField, Reconstruction, Symm
 use super::shape::{self, Shares};
 use super::walls::Walls;
 use super::{ResampleError, Samples};
-use blend::Degree;
+use blend::Mean;
 use bodies::Bodies;
 use border::Border;
 use glam::DVec3;
@@ -278,14 +278,14 @@ impl CellField {
 
     /// A walker, which one thread uses for many lines.
     pub fn walker(&self) -> CellWalker<'_> {
-        CellWalker::new(self, Degree::Third)
+        CellWalker::new(self, Mean::Exact)
     }
 
     /// A walker whose values differ from those of [`CellField::walker`] by the error that the mesh
-    /// itself makes, about: those of polynomials of second degree instead of third. See
+    /// itself makes, about: those of a less accurate mean of the same polynomials. See
     /// [`super::ResampledField::truncation`].
-    pub fn walker_to_second_degree(&self) -> CellWalker<'_> {
-        CellWalker::new(self, Degree::Second)
+    pub fn walker_of_lower_order(&self) -> CellWalker<'_> {
+        CellWalker::new(self, Mean::Plain)
     }
 
     /// The median of the values on those faces of the border that lie in the sides of the mesh's

@@ -1,7 +1,7 @@
 //! Follows lines from cell to cell.
 
 use super::CellField;
-use super::blend::{Degree, Share};
+use super::blend::{Mean, Share};
 use super::cell::PreparedCell;
 use super::shares::shares;
 use crate::resample::mesh::{HIDDEN, OUTSIDE, WALL};
@@ -56,13 +56,13 @@ pub struct CellWalker<'a> {
     field: &'a CellField,
     kept: Vec<Option<Box<(u32, PreparedCell)>>>,
     shares: Vec<Share>,
-    degree: Degree,
+    mean: Mean,
 }
 
 impl<'a> CellWalker<'a> {
-    pub(super) fn new(field: &'a CellField, degree: Degree) -> CellWalker<'a> {
+    pub(super) fn new(field: &'a CellField, mean: Mean) -> CellWalker<'a> {
         let kept = std::iter::repeat_with(|| None).take(KEPT).collect();
-        CellWalker { field, kept, shares: Vec::with_capacity(1), degree }
+        CellWalker { field, kept, shares: Vec::with_capacity(1), mean }
     }
 
     fn slot(&mut self, cell: u32) -> usize {
@@ -72,11 +72,11 @@ impl<'a> CellWalker<'a> {
             Some(kept) if kept.0 == cell => {}
             Some(kept) => {
                 kept.0 = cell;
-                kept.1.prepare(self.field, cell as usize, self.degree);
+                kept.1.prepare(self.field, cell as usize, self.mean);
             }
             empty => {
                 let mut new = Box::new((cell, PreparedCell::default()));
-                new.1.prepare(self.field, cell as usize, self.degree);
+                new.1.prepare(self.field, cell as usize, self.mean);
                 *empty = Some(new);
             }
         }

@@ -16,6 +16,8 @@ pub(super) struct Counts {
     pub(super) nearest: usize,
     /// As many when these leave a power undetermined, as at borders.
     pub(super) more: usize,
+    /// Number of the nearest values that a polynomial of fourth degree is fitted to.
+    pub(super) quartic: usize,
     /// Number of samples of a spline: on a grid, those that share a cell.
     pub(super) adjacent: usize,
     /// The nearest of them, as on a grid. The spline gives each a quarter of the point's own
@@ -26,9 +28,9 @@ pub(super) struct Counts {
 }
 
 const COUNTS: [Counts; 3] = [
-    Counts { nearest: 6, more: 24, adjacent: 2, next: 2, terms: [0, 1, 2, 3] },
-    Counts { nearest: 16, more: 60, adjacent: 8, next: 4, terms: [0, 2, 5, 9] },
-    Counts { nearest: 40, more: 120, adjacent: 26, next: 6, terms: TERMS_TO_DEGREE },
+    Counts { nearest: 6, more: 24, quartic: 8, adjacent: 2, next: 2, terms: [0, 1, 2, 3] },
+    Counts { nearest: 16, more: 60, quartic: 28, adjacent: 8, next: 4, terms: [0, 2, 5, 9] },
+    Counts { nearest: 40, more: 120, quartic: 68, adjacent: 26, next: 6, terms: TERMS_TO_DEGREE },
 ];
 
 impl Counts {

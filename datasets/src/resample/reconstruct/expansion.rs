@@ -6,16 +6,16 @@ use super::counts::Counts;
 use super::least_squares::NormalEquations;
 use super::neighbours::Neighbourhood;
 use super::polynomial::{TERMS, TERMS_TO_DEGREE, means, monomials};
+use super::quartic;
 use crate::resample::mesh::Mesh;
 use glam::DVec3;
-use std::ops::Range;
 
 /// Equations for each unknown, at least.
 const EQUATIONS_PER_TERM: f64 = 1.25;
 
 /// Samples nearer than this, squared and in the frame, weigh as if they were there: a point twice
 /// in the mesh, or a cell around the point.
-const NEAREST_SQUARE: f64 = 0.2;
+pub(super) const NEAREST_SQUARE: f64 = 0.2;
 
 /// A polynomial whose residual, as a part of the variation around the point, is below the first
 /// number is used as it is; from the second on, it is not used. Steps and noise leave more than the
@@ -30,7 +30,7 @@ const QUADRATIC_SHARE: f64 = 0.7;
 /// Where a polynomial gives way, the error is larger than what the spline adds: a step between two
 /// points may be anywhere between them. Counted twice, it is 107 times the error of a bell three
 /// cells wide on hexahedra, which says nothing any more.
-const UNRESOLVED: f64 = 1.75;
+pub(in crate::resample) const UNRESOLVED: f64 = 1.75;
 
 /// Number of coefficients of a polynomial of second degree.
 const SPLINE: usize = 1 + TERMS_TO_DEGREE[2];
@@ -69,6 +69,16 @@ pub(in crate::resample) struct Parts {
     pub(in crate::resample) constant: f32,
     pub(in crate::resample) terms: [f32; TERMS],
     pub(in crate::resample) bounds: Bounds,
+}
+
+impl Parts {
+    /// The same polynomial times a factor.
+    pub(in crate::resample) fn times(mut self, factor: f32) -> Parts {
+        self.terms.iter_mut().for_each(|c| *c *= factor);
+        self.constant *= factor;
+        self.bounds = self.bounds.times(factor);
+        self
+    }
 }
 
 /// Bounds of what is added to a point's value. From there on it grows ever slower, without a kink,
@@ -114,21 +124,6 @@ impl Expansion {
         Parts { frame: self.frame, constant: self.constant, terms: self.terms, bounds: self.bounds }
     }
 
-    /// The numbers of a polynomial whose difference from this one is the second of
-    /// [`Expansion::parts_at`].
-    pub(in crate::resample) fn parts_to_second_degree(&self) -> Parts {
-        let mut parts = self.parts();
-        if self.is_whole() {
-            parts.terms[TERMS_TO_DEGREE[2]..].fill(0.0);
-            return parts;
-        }
-        let factor = (1.0 - UNRESOLVED) as f32;
-        parts.terms.iter_mut().for_each(|c| *c *= factor);
-        parts.constant *= factor;
-        parts.bounds = parts.bounds.times(factor);
-        parts
-    }
-
     pub(super) fn state(&self) -> State {
         self.state
     }
@@ -139,32 +134,45 @@ impl Expansion {
     }
 
     /// Whether the polynomial is used as it is.
-    pub(super) fn is_whole(&self) -> bool {
+    pub(in crate::resample) fn is_whole(&self) -> bool {
         self.state == State::Fitted
     }
 
     /// The value at distance `d` from the point, whose own value is `value`.
     #[inline]
     pub(super) fn at(&self, value: f64, d: DVec3) -> f64 {
-        value + self.parts_at(d)[0]
+        value + self.change(d, [1.0; 3])
     }
 
-    /// What is added to the point's value at distance `d`, and the part of it that a less accurate
-    /// polynomial would leave out: the third powers, or [`UNRESOLVED`] times all where the
-    /// polynomial is not whole.
+    /// What is added to the point's value at distance `d`, with a factor for the terms of each
+    /// degree ([`factors`]).
     #[inline]
-    pub(super) fn parts_at(&self, d: DVec3) -> [f64; 2] {
+    pub(super) fn change(&self, d: DVec3, factors: [f64; 3]) -> f64 {
         let terms = monomials(in_frame(&self.frame, d));
-        let of = |range: Range<usize>| -> f64 {
+        let of = |degree: usize| -> f64 {
+            let range = TERMS_TO_DEGREE[degree - 1]..TERMS_TO_DEGREE[degree];
             let terms = self.terms[range.clone()].iter().zip(&terms[range]);
-            terms.map(|(c, m)| f64::from(*c) * m).sum()
+            factors[degree - 1] * terms.map(|(c, m)| f64::from(*c) * m).sum::<f64>()
         };
-        let third = of(TERMS_TO_DEGREE[2]..TERMS);
-        let change = f64::from(self.constant) + (of(0..TERMS_TO_DEGREE[2]) + third);
-        let bounded = self.bounds.bounded(change);
-        [bounded, if self.is_whole() { third } else { UNRESOLVED * bounded }]
+        self.bounds.bounded(f64::from(self.constant) + (of(1) + of(2) + of(3)))
     }
 }
+
+/// Factors of the terms of degree 1 to 3 in a mean of the corners' polynomials. `whole` is the
+/// share of corners whose polynomials are used as they are.
+///
+/// For shares with Σ Nᵢ xᵢ = x and Σ Nᵢ = 1, as those of elements are, the mean of Taylor
+/// polynomials of degree n whose terms of degree k have the factor 1 - k/(n + 1) is exact for
+/// polynomials of degree n + 1, where the mean of the polynomials themselves is exact for degree n
+/// (Kraaijpoel and van Leeuwen, "Raising the order of multivariate approximation schemes using
+/// supplementary derivative data", 2010). Factors must be the same for all corners, or not even
+/// lines are exact. The share is continuous, so the value is too.
+pub(in crate::resample) fn factors(whole: f64) -> [f64; 3] {
+    [1.0, 2.0, 3.0].map(|k| 1.0 - FACTOR_FALL * k * whole)
+}
+
+/// What the factor of a whole polynomial's terms loses with each degree: 1/(n + 1).
+pub(in crate::resample) const FACTOR_FALL: f64 = 0.25;
 
 #[inline]
 fn in_frame(f: &[f32; 6], d: DVec3) -> DVec3 {
@@ -217,12 +225,12 @@ fn frame_of(spread: [f64; 6]) -> Option<[f32; 6]> {
 
 /// A value at a place, and its distance from the point, squared, in the frame.
 #[derive(Debug, Clone, Copy)]
-struct Sample {
-    square: f64,
+pub(super) struct Sample {
+    pub(super) square: f64,
     id: u32,
-    value: f64,
+    pub(super) value: f64,
     /// Mean position in the frame.
-    place: DVec3,
+    pub(super) place: DVec3,
     /// Second moments in the frame.
     second: [f64; 6],
 }
@@ -344,6 +352,14 @@ impl Fit {
         let Some(solution) = best else { return Expansion::nothing(State::FewNeighbours) };
         let share = share_of(solution.residual);
         let mut coefficients = solution.coefficients.map(|c| share * c);
+        if share == 1.0
+            && solution.degree == 3
+            && !free
+            && let Some(terms) =
+                quartic::to_third_degree(within(&self.samples, counts.quartic), counts)
+        {
+            coefficients[1..].copy_from_slice(&terms);
+        }
         if share < 1.0 {
             let mut spline = spline_at(&self.samples, counts, free);
             // It goes through the point's value. With the spline's own, or half-way, a shock that

@@ -3,11 +3,13 @@
 //! The finite elements of a mesh are linear along its edges, so their gradients jump from cell to
 //! cell. Light is bent by gradients: a lattice finer than the mesh would show the cells. Here, each
 //! point gets a polynomial of up to third degree, fitted by weighted least squares to the values
-//! around it ([`expansion`]), and the value at a place in a cell is the mean of the polynomials of
-//! the cell's corners, weighted by their shares ([`super::shape`]). This is a partition of unity
-//! (Melenk and Babuška, "The partition of unity finite element method", 1996): continuous, exact
-//! for cubic fields, and with an error of fourth order in the size of the cells (third order for
-//! gradients) where the field is smooth.
+//! around it ([`expansion`]; [`quartic`] keeps fourth derivatives out of it), and the value at a
+//! place in a cell is the mean of the polynomials of the cell's corners, weighted by their shares
+//! ([`super::shape`]). This is a partition of unity (Melenk and Babuška, "The partition of unity
+//! finite element method", 1996). With factors for the terms of each degree ([`factors`]) it is
+//! continuous, exact for fields of fourth degree, and with an error of fifth order in the size of
+//! the cells (fourth order for gradients) where the field is smooth. Against the plain mean of
+//! cubic fits, deflections through a bell at 30,000 points by chance have a tenth of the error.
 //!
 //! Where no polynomial fits, as at shocks, the mesh does not tell where in a cell the field
 //! changes. Slopes and curvature of a cubic B-spline with the values as its coefficients take the
@@ -23,8 +25,9 @@ mod expansion;
 mod least_squares;
 mod neighbours;
 mod polynomial;
+mod quartic;
 
-pub(super) use expansion::Expansion;
+pub(super) use expansion::{Expansion, FACTOR_FALL, UNRESOLVED, factors};
 pub(super) use polynomial::TERMS;
 
 use super::mesh::{Mesh, Shape};
@@ -149,20 +152,35 @@ impl<'a> PointField<'a> {
         }
     }
 
-    /// The value at `p` in the cell with these corners, from their shares there, and the part of it
-    /// that less accurate polynomials would leave out ([`Expansion::parts_at`]).
+    /// The value at `p` in the cell with these corners, from their shares there, and by how much a
+    /// less accurate mean of the same polynomials differs.
     pub(super) fn at(&self, mesh: &Mesh, corners: &[u32], weights: &[f64], p: DVec3) -> [f64; 2] {
+        let is_whole = |id: u32| self.expansions.get(id as usize).is_some_and(Expansion::is_whole);
+        let whole = match self.shares(corners) {
+            Shares::Smooth => 0.0,
+            Shares::OfElement => {
+                let whole = corners.iter().zip(weights).filter(|(id, _)| is_whole(**id));
+                whole.map(|(_, w)| w).sum::<f64>()
+            }
+        };
+        let factors = factors(whole);
         let mut sum = [0.0; 2];
         for (&id, &weight) in corners.iter().zip(weights) {
             // 0 · NaN is NaN: a corner without weight must not affect the value.
             if weight != 0.0 {
                 let (id, value) = (id as usize, self.values[id as usize]);
-                let [change, last] = match self.expansions.get(id) {
-                    Some(expansion) => expansion.parts_at(p - mesh.point(id)),
-                    None => [0.0; 2],
+                let Some(expansion) = self.expansions.get(id) else {
+                    sum[0] += weight * value;
+                    continue;
                 };
+                let d = p - mesh.point(id);
+                let change = expansion.change(d, factors);
                 sum[0] += weight * (value + change);
-                sum[1] += weight * last;
+                sum[1] += weight
+                    * match expansion.is_whole() {
+                        true => expansion.change(d, [1.0; 3]) - change,
+                        false => UNRESOLVED * change,
+                    };
             }
         }
         sum

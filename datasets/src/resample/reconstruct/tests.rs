@@ -300,8 +300,7 @@ fn few_points_and_flat_meshes_give_the_values_of_the_elements() {
     }
 }
 
-/// What the last degree adds is nothing where it is not needed, and larger than the error where it
-/// is.
+/// What the factors add is nothing where it is not needed, and larger than the error where it is.
 #[test]
 fn truncation_is_nothing_for_quadratic_fields_and_above_the_error_of_a_bell() {
     let mesh = Mesh::new(&tetrahedra(13, waved(13, 0.02))).unwrap();
