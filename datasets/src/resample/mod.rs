@@ -14,6 +14,7 @@
 //! back at the points of the mesh.
 
 mod beyond_border;
+mod corner_values;
 mod extrude;
 mod face_tree;
 mod jumps;
@@ -28,6 +29,7 @@ mod smooth;
 mod walls;
 
 pub use beyond_border::in_bodies;
+pub use corner_values::corner_values;
 pub use jumps::{JumpReport, average_jumps};
 pub use mesh::{Mesh, Plane};
 pub use on_cells::{Beyond, CellField, CellReport, CellWalker, Entry};

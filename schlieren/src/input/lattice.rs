@@ -3,16 +3,18 @@
 use super::{Depth, InputError, Options};
 use datasets::model::{Attributes, ColorBy, Dataset, extent_dims};
 use datasets::resample::{
-    self, Lattice, Mark, Mesh, Plane, Report, Resolution, Samples, Walls, in_bodies,
+    self, Lattice, Mark, Mesh, Plane, Report, Resolution, Samples, Walls, corner_values, in_bodies,
     resample as resample_mesh, revolve, revolved_bounds,
 };
 use glam::{DMat3, DQuat, DVec3};
 
 /// The points at which the index is computed.
 pub(super) enum SamplePoints {
-    /// The nodes of a uniform lattice, which is used unchanged.
+    /// The points of a uniform lattice, which is used unchanged, or its cells.
     Uniform {
+        /// The points.
         lattice: Lattice,
+        per_point: bool,
         /// Axes that run backwards in the file.
         backwards: [bool; 3],
     },
@@ -56,8 +58,7 @@ impl SamplePoints {
             && options.depth.is_none()
             && options.samples_per_axis == 1
         {
-            let lattice = if per_point { lattice } else { cell_centres(lattice) };
-            return Ok(SamplePoints::Uniform { lattice, backwards });
+            return Ok(SamplePoints::Uniform { lattice, per_point, backwards });
         }
         let mesh = Box::new(mesh_of(data, options)?);
         Ok(SamplePoints::Mesh { mesh, per_point, own: own.map(|o| o.0) })
@@ -111,12 +112,12 @@ impl SamplePoints {
                 (false, false) => mesh.gather_cells(data, of),
                 (true, false) => mesh.cells_to_points(&mesh.gather_cells(data, of)),
             },
-            SamplePoints::Uniform { lattice, backwards } => {
+            SamplePoints::Uniform { lattice, per_point, backwards } => {
                 let leaves = data.leaves();
                 let Some(a) = leaves.first().and_then(|l| l.attributes()) else {
                     return Vec::new();
                 };
-                let d = lattice.dims;
+                let d = if *per_point { lattice.dims } else { cells_of(lattice) };
                 let source = |i: usize| {
                     let mut at = [i % d[0], i / d[0] % d[1], i / d[0] / d[1]];
                     for axis in 0..3 {
@@ -126,7 +127,7 @@ impl SamplePoints {
                     }
                     at[0] + d[0] * (at[1] + d[1] * at[2])
                 };
-                (0..lattice.len()).map(|i| of(a, source(i))).collect()
+                (0..d.iter().product()).map(|i| of(a, source(i))).collect()
             }
         }
     }
@@ -156,12 +157,19 @@ impl SamplePoints {
         options: &Options,
     ) -> Result<LatticeValues, InputError> {
         match self {
-            SamplePoints::Uniform { lattice, .. } => {
+            SamplePoints::Uniform { lattice, per_point, .. } => {
+                // Where a cell has no value, its centre is a node: the border of a body at the
+                // cell's faces is then midway between nodes, and in its place.
+                let (lattice, values) = match (per_point, values.iter().all(|v| v.is_finite())) {
+                    (true, _) => (*lattice, values),
+                    (false, true) => (*lattice, corner_values(cells_of(lattice), &values)),
+                    (false, false) => (cell_centres(lattice), values),
+                };
                 let values: Vec<f32> = values.into_iter().map(|v| v as f32).collect();
                 let mark = |v: &f32| if v.is_finite() { Mark::Inside } else { Mark::NotFinite };
                 let marks = values.iter().map(mark).collect();
                 let truncation = vec![];
-                Ok(LatticeValues { lattice: *lattice, values, truncation, marks, report: None })
+                Ok(LatticeValues { lattice, values, truncation, marks, report: None })
             }
             SamplePoints::Mesh { mesh, per_point, own } => {
                 let lattice = target(mesh, own.as_ref(), options)?;
@@ -263,9 +271,14 @@ fn sheet(data: &Dataset) -> f64 {
     if longest > 0.0 { 1e-6 * longest } else { 1.0 }
 }
 
-fn cell_centres(points: Lattice) -> Lattice {
+/// Number of cells along each axis.
+fn cells_of(points: &Lattice) -> [usize; 3] {
+    points.dims.map(|d| d.saturating_sub(1))
+}
+
+fn cell_centres(points: &Lattice) -> Lattice {
     Lattice {
-        dims: points.dims.map(|d| d.saturating_sub(1)),
+        dims: cells_of(points),
         origin: points.origin + 0.5 * points.spacing,
         spacing: points.spacing,
     }
