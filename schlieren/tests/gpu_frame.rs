@@ -7,8 +7,10 @@
 mod common;
 
 use common::{cube, lopsided};
+use glam::DVec3;
 use schlieren::field::{Field, Node};
 use schlieren::gpu::Gpu;
+use schlieren::media::{Media, Property, Volume};
 use schlieren::render::{Control, Layers, RenderOutput, TestSection, render};
 use schlieren::scene::Scene;
 use schlieren::solids::Solids;
@@ -49,6 +51,23 @@ fn exposed(field: &Field, scene: &Scene) -> RenderOutput {
     let section = TestSection::of_fields(scene, vec![field.clone()], None).unwrap();
     let layers = Layers { counts: true, noise: true, ..Layers::NONE };
     render(scene, &section, layers, &Control::default()).unwrap()
+}
+
+/// As [`exposed`], through smoke in waves that turns the light's polarisation. Their lattices are
+/// not that of the field.
+fn exposed_through_smoke(field: &Field, scene: &Scene) -> RenderOutput {
+    let wave = |p: DVec3| (3.0 * p.x - 2.0 * p.y + 4.0 * p.z).sin();
+    let volume = |n: usize, scale: f64, offset: f64| {
+        let spacing_m = field.size_m() * 1.2 / (n - 1) as f64;
+        let low = field.origin_m() - 0.1 * field.size_m();
+        let value = |p: DVec3| offset + scale * wave(p - field.origin_m());
+        Volume::from_fn([n; 3], spacing_m.to_array(), low, value).unwrap()
+    };
+    let media = Media::default()
+        .with(Property::Absorption, volume(19, 0.3, 0.4))
+        .with(Property::Rotation, volume(40, 2.0, -0.5));
+    let section = TestSection::of_fields(scene, vec![field.clone()], None).unwrap();
+    render(scene, &section.with_media(media), Layers::NONE, &Control::default()).unwrap()
 }
 
 /// The frames of the GPU and of the CPU. The GPU must have exposed its own.
@@ -412,6 +431,61 @@ fn a_frame_has_the_same_bits_in_every_run() {
             assert_eq!(exposed(&field, &scene).pixels, first, "{sampling}");
         }
     }
+}
+
+#[test]
+fn the_medium_dims_and_turns_the_light_of_a_frame_on_the_device() {
+    if !has_gpu() {
+        return;
+    }
+    let field = cube(24, lopsided);
+    let bos = "[technique]\nkind = \"bos\"\nseed = 5\n";
+    let tilted =
+        "[light]\nbeams = \"tilted\"\n[light.source]\nkind = \"circle\"\ndiameter_m = 2e-3\n";
+    for media in [
+        "absorption = \"smoke\"\n",
+        "rotation = \"turn\"\nanalyser_deg = 30.0\n",
+        "absorption = \"smoke\"\nrotation = \"turn\"\nanalyser_deg = 75.0\n",
+    ] {
+        for rest in [
+            format!("{KNIFE}{PHOTONS}{NO_FILTER}"),
+            format!("{KNIFE}{BEAMS}"),
+            format!("{KNIFE}{tilted}{PHOTONS}{NO_FILTER}"),
+            format!("{bos}{PHOTONS}{NO_FILTER}"),
+        ] {
+            let rest = format!("[media]\n{media}{rest}");
+            let [gpu, cpu] =
+                ["gpu", "cpu"].map(|d| exposed_through_smoke(&field, &scene(d, "", &rest)));
+            check_device(&gpu, &cpu, &rest);
+            let off = |(a, b): &(&[f32; 3], &[f32; 3])| (a[0] - b[0]).abs() > 5e-5;
+            let changed = gpu.pixels.iter().zip(&cpu.pixels).filter(off).count();
+            let [worst, brightest] = difference(&gpu, &cpu);
+            assert!(changed <= 3, "{rest}: {changed} pixels, {worst:e} of {brightest}");
+            // The CPU traces corners of beams twice where its tiles meet.
+            let [on_gpu, on_cpu] = [&gpu, &cpu].map(|o| o.report.counters.media_rays);
+            assert!(on_gpu == on_cpu || rest.contains("beams\"\n") && on_gpu < on_cpu, "{rest}");
+        }
+    }
+}
+
+/// The smoke stays on the device for the next frame.
+#[test]
+fn the_medium_is_copied_to_the_device_once() {
+    if !has_gpu() {
+        return;
+    }
+    let rest = format!("[media]\nabsorption = \"smoke\"\n{KNIFE}{PHOTONS}");
+    let scene = scene("gpu", "", &rest);
+    let field = cube(17, lopsided);
+    let smoke = Volume::from_fn([20; 3], [0.05; 3], DVec3::splat(-0.5), |p| p.x * p.x).unwrap();
+    let section = TestSection::of_fields(&scene, vec![field], None).unwrap();
+    let section = section.with_media(Media::default().with(Property::Absorption, smoke));
+    let section = section.with_caches();
+    let [first, second] = [(); 2].map(|()| {
+        let out = render(&scene, &section, Layers::NONE, &Control::default()).unwrap();
+        out.report.device.unwrap().bytes_to_device
+    });
+    assert!(second + 4 * 20 * 20 * 20 <= first, "{first} {second}");
 }
 
 #[test]

@@ -34,7 +34,8 @@ mod volume;
 mod work;
 
 pub use device::Gpu;
-pub(crate) use frame::NotExposed;
+pub use frame::MediaCache;
+pub(crate) use frame::{FrameMedia, NotExposed};
 pub use method::{GpuOptions, Method};
 pub use paths::GpuPaths;
 pub use volume::VolumeCache;

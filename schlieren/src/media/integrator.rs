@@ -84,6 +84,30 @@ impl<'a> MediaIntegrator<'a> {
         &self.frame.view
     }
 
+    /// The same on a device; `None` for rays that bend strongly.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn on_device(
+        &self,
+        analyser_rad: Option<f64>,
+        cache: Option<&'a crate::gpu::MediaCache>,
+    ) -> Option<crate::gpu::FrameMedia<'a>> {
+        let [absorption, _, rotation] = self.wanted;
+        let bent = match self.bend_field {
+            BendField::Straight => false,
+            BendField::Paraxial(_) => true,
+            BendField::Full(_) => return None,
+        };
+        Some(crate::gpu::FrameMedia {
+            absorption,
+            rotation,
+            analyser_rad,
+            bent,
+            step_voxels: self.step_voxels,
+            origin_m: self.field.origin_m(),
+            cache,
+        })
+    }
+
     /// Whether a node of this kind ends a ray.
     pub(super) fn stops(&self, kind: u8) -> bool {
         kind == Node::Solid as u8 || (kind != Node::Gas as u8 && self.blank == BlankCells::Opaque)

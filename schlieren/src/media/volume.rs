@@ -144,6 +144,22 @@ impl Volume {
         self.dims
     }
 
+    /// Distance of nodes along x, y and z in metres.
+    pub fn spacing_m(&self) -> DVec3 {
+        self.spacing_m
+    }
+
+    /// Place of the first node in metres.
+    pub fn origin_m(&self) -> DVec3 {
+        self.origin_m
+    }
+
+    /// The values at the nodes, x fastest.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn nodes(&self) -> Vec<f32> {
+        self.values.nodes()
+    }
+
     /// Smallest and largest value.
     pub fn range(&self) -> [f32; 2] {
         self.range

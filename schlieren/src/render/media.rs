@@ -65,10 +65,19 @@ impl TestSection {
         };
         let integrator = self.media_integrator(media, line, view, &planned, &wanted);
         let (analyser, rays) = (scene.media.analyser_rad(), Arc::clone(&planned.media_rays));
-        planned.paths = Box::new(AttenuatedPaths::new(planned.paths, integrator, analyser, rays));
-        // The device does not know what dims the light.
         #[cfg(feature = "gpu")]
-        (planned.on_device = None);
+        if planned.on_device.is_some() {
+            let cache = self.caches.get(line).map(|c| &c.media);
+            planned.media_on_device = integrator.on_device(analyser, cache);
+            if planned.media_on_device.is_none() {
+                planned.on_device = None;
+                planned.warnings.push(
+                    "the index is so strong that absorption and rotation are integrated on the CPU"
+                        .into(),
+                );
+            }
+        }
+        planned.paths = Box::new(AttenuatedPaths::new(planned.paths, integrator, analyser, rays));
         Ok(planned)
     }
 

@@ -174,11 +174,13 @@ pub(super) fn photograph_photons<const C: usize>(
     #[cfg(feature = "gpu")]
     if let (Some(device), Some(filter)) = (&planned.on_device, filter.weights()) {
         let FilmControl { cancel, progress } = *control;
-        let filter = (&filter[..], noise);
-        return exposed(
-            device.photograph_photons(setup, framing, 0..samples, filter, cancel, progress),
-            report,
-        );
+        let (media, filter) = (planned.media_on_device.as_ref(), (&filter[..], noise));
+        let passes = 0..samples;
+        let made =
+            device.photograph_photons(setup, media, framing, passes, filter, cancel, progress);
+        let made = exposed(made, report)?;
+        count_media(planned, made.as_ref().map(|m| not_behind_bodies(&m.tally)));
+        return Ok(made);
     }
     let _ = (planned, setup, framing, samples, filter, noise, control, report);
     Ok(None)
@@ -196,8 +198,14 @@ pub(super) fn photograph_beams<const C: usize>(
     #[cfg(feature = "gpu")]
     if let Some(device) = &planned.on_device {
         let FilmControl { cancel, progress } = *control;
-        let picture = device.photograph_beams(setup, framing, per_side, cancel, progress);
-        return exposed(picture, report);
+        let media = planned.media_on_device.as_ref();
+        let made = device.photograph_beams(setup, media, framing, per_side, cancel, progress);
+        let made = exposed(made, report)?;
+        let corners =
+            |n: u32| (u64::from(n) + 2 * u64::from(setup.margin_px)) * u64::from(per_side) + 1;
+        let rays = corners(framing.width) * corners(framing.height);
+        count_media(planned, made.as_ref().map(|_| rays));
+        return Ok(made);
     }
     let _ = (planned, setup, framing, per_side, control, report);
     Ok(None)
@@ -215,7 +223,11 @@ pub(super) fn expose_photons<const C: usize>(
     #[cfg(feature = "gpu")]
     if let Some(device) = &planned.on_device {
         let FilmControl { cancel, progress } = *control;
-        return exposed(device.expose_photons(setup, films, 0..samples, cancel, progress), report);
+        let media = planned.media_on_device.as_ref();
+        let made = device.expose_photons(setup, media, films, 0..samples, cancel, progress);
+        let made = exposed(made, report)?;
+        count_media(planned, made.as_ref().map(not_behind_bodies));
+        return Ok(made);
     }
     let _ = (planned, setup, films, samples, control, report);
     Ok(None)
@@ -228,6 +240,20 @@ pub(super) struct FilmControl<'a> {
     pub(super) cancel: &'a AtomicBool,
     /// Receives numbers of traced rays.
     pub(super) progress: &'a (dyn Fn(u64) + Sync),
+}
+
+/// Counts the rays along which the device has integrated media.
+#[cfg(feature = "gpu")]
+fn count_media(planned: &PlannedPaths<'_>, rays: Option<u64>) {
+    if let (Some(_), Some(rays)) = (&planned.media_on_device, rays) {
+        planned.media_rays.fetch_add(rays, std::sync::atomic::Ordering::Relaxed);
+    }
+}
+
+/// Photons that were traced.
+#[cfg(feature = "gpu")]
+fn not_behind_bodies(tally: &Tally) -> u64 {
+    tally.sent - tally.blocked_by_solids
 }
 
 #[cfg(feature = "gpu")]

@@ -146,12 +146,7 @@ impl TestSection {
         let planned =
             on_gpu(march, field, view, with(mode), measure.then_some(MEASURED_RAYS), caches)?;
         let why_not = match planned {
-            Ok(mut planned) => {
-                if !scene.media.attenuating().is_empty() {
-                    planned
-                        .warnings
-                        .push("absorption and rotation are integrated on the CPU".into());
-                }
+            Ok(planned) => {
                 return Ok(self
                     .attenuated(scene, line, view, planned)?
                     .in_image_frame(against_light));

@@ -47,6 +47,9 @@ pub struct PlannedPaths<'a> {
     /// The same paths, if the whole frame can be computed where they are.
     #[cfg(feature = "gpu")]
     pub(super) on_device: Option<Arc<crate::gpu::GpuPaths<'a>>>,
+    /// What dims the light there.
+    #[cfg(feature = "gpu")]
+    pub(super) media_on_device: Option<crate::gpu::FrameMedia<'a>>,
 }
 
 impl<'a> PlannedPaths<'a> {
@@ -72,6 +75,8 @@ impl<'a> PlannedPaths<'a> {
             cell_work: None,
             #[cfg(feature = "gpu")]
             on_device: None,
+            #[cfg(feature = "gpu")]
+            media_on_device: None,
         }
     }
 

@@ -42,6 +42,8 @@ pub(super) struct Caches {
     pub(super) field: FieldCache,
     #[cfg(feature = "gpu")]
     pub(super) device: crate::gpu::VolumeCache,
+    #[cfg(feature = "gpu")]
+    pub(super) media: crate::gpu::MediaCache,
     pub(super) shift: ShiftCache,
 }
 

@@ -26,10 +26,10 @@ fn trace_corners(@builtin(global_invocation_id) id: vec3u) {
                 let key = pixel_key(frame.seed, 0u, 0u);
                 for (var i = 0u; i < SOURCE_POINTS; i++) {
                     photon.image_point_m = source_point(square(key, i, 0u));
-                    energy += technique_energy(photon) / f32(SOURCE_POINTS);
+                    energy += technique_energy(photon) * (photon.left / f32(SOURCE_POINTS));
                 }
             } else {
-                energy = technique_energy(photon);
+                energy = technique_energy(photon) * photon.left;
             }
         }
         var shift = vec2f(photon.shift_m.x, -photon.shift_m.y) * frame.per_pixel_m;

@@ -13,6 +13,8 @@ struct Photon {
     // The worst node that it met.
     worst_node: u32,
     steps: u32,
+    // The part of its light that the medium leaves.
+    left: f32,
 }
 
 // Components of a deviation along the right and up of a ray's own beam, whose frame is the view's
@@ -58,6 +60,10 @@ fn trace(position_m: vec2f, image_point_m: vec2f) -> Photon {
     if OPD {
         photon.path_m = out.opd * start.scale * frame.unit_m * frame.n0
             + frame.n0 * lever_m * sine2 / (cosine * (1.0 + cosine));
+    }
+    photon.left = 1.0;
+    if MEDIA && !is_stopped(photon) {
+        photon.left = passes_medium(position_m, tilt);
     }
     return photon;
 }

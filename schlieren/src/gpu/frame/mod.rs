@@ -11,6 +11,7 @@
 //! | params.rs, frame.wgsl | the numbers of a frame |
 //! | double.wgsl, sampler.wgsl | numbers of 48 bits; sample points |
 //! | start.wgsl, exit.wgsl | a photon's ray, and what it brings to the film |
+//! | media.rs, media.wgsl, property.wgsl | absorption and rotation on a photon's way |
 //! | bodies.wgsl | the bits of rays that bodies stop |
 //! | technique.rs, technique/*.wgsl | its energy, by technique and cut-off |
 //! | photons.wgsl, corners.wgsl, triangles.wgsl | entry points |
@@ -20,6 +21,7 @@
 //! | shader.rs | the shaders, assembled from what a scene needs |
 
 mod film;
+mod media;
 mod params;
 mod shader;
 mod submissions;
@@ -31,6 +33,8 @@ use super::{GpuError, GpuPaths};
 use crate::film::photons::Exposure;
 use crate::film::{Film, Framing, Photograph, Tally};
 use film::{FilmLayout, add_to_films, outcomes, pictures};
+pub(crate) use media::FrameMedia;
+pub use media::MediaCache;
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 use submissions::FrameOnDevice;
@@ -58,6 +62,8 @@ struct Job<'a> {
     framing: Framing,
     layout: FilmLayout,
     technique: &'a TechniqueShader<'a>,
+    /// What dims the light on its way.
+    media: Option<&'a FrameMedia<'a>>,
     light: Light,
     /// Weights of a filter by distance, if the picture is made on the device.
     filter: Option<&'a [f64]>,
@@ -87,6 +93,7 @@ impl GpuPaths<'_> {
     pub(crate) fn expose_photons<const C: usize>(
         &self,
         exposure: &Exposure<'_>,
+        media: Option<&FrameMedia<'_>>,
         films: &[Film<C>],
         passes: Range<u32>,
         cancel: &AtomicBool,
@@ -96,7 +103,7 @@ impl GpuPaths<'_> {
         let light = Light::Photons { passes };
         let framing = *films[0].framing();
         let (words, tally) =
-            self.expose(exposure, framing, layout, light, None, cancel, progress)?;
+            self.expose(exposure, media, framing, layout, light, None, cancel, progress)?;
         add_to_films(layout, &words, films);
         Ok(tally)
     }
@@ -110,6 +117,7 @@ impl GpuPaths<'_> {
     pub(crate) fn photograph_photons<const C: usize>(
         &self,
         exposure: &Exposure<'_>,
+        media: Option<&FrameMedia<'_>>,
         framing: Framing,
         passes: Range<u32>,
         (filter, noise): (&[f64], bool),
@@ -120,7 +128,7 @@ impl GpuPaths<'_> {
         let layout = FilmLayout::of_picture::<C>(&framing, noise);
         let filter = Some(filter);
         let (words, tally) =
-            self.expose(exposure, framing, layout, light, filter, cancel, progress)?;
+            self.expose(exposure, media, framing, layout, light, filter, cancel, progress)?;
         let mut pixels = pictures(&words);
         let noise = noise.then(|| pixels.split_off(framing.pixels()));
         Ok(Photograph { pixels, noise, tally })
@@ -133,6 +141,7 @@ impl GpuPaths<'_> {
     pub(crate) fn photograph_beams<const C: usize>(
         &self,
         exposure: &Exposure<'_>,
+        media: Option<&FrameMedia<'_>>,
         framing: Framing,
         per_side: u32,
         cancel: &AtomicBool,
@@ -142,7 +151,7 @@ impl GpuPaths<'_> {
         let layout = FilmLayout::of_picture::<C>(&framing, false);
         let filter = Some(&[1.0][..]);
         let (words, tally) =
-            self.expose(exposure, framing, layout, light, filter, cancel, progress)?;
+            self.expose(exposure, media, framing, layout, light, filter, cancel, progress)?;
         Ok(Photograph { pixels: pictures(&words), noise: None, tally })
     }
 
@@ -150,6 +159,7 @@ impl GpuPaths<'_> {
     fn expose(
         &self,
         exposure: &Exposure<'_>,
+        media: Option<&FrameMedia<'_>>,
         framing: Framing,
         layout: FilmLayout,
         light: Light,
@@ -169,7 +179,8 @@ impl GpuPaths<'_> {
             .fold(0.0, f64::max);
         let technique = TechniqueShader::new(exposure.technique, reach_m).map_err(refused)?;
         let technique = &technique;
-        let job = Job { exposure, framing, layout, technique, light, filter, cancel, progress };
+        let job =
+            Job { exposure, framing, layout, technique, media, light, filter, cancel, progress };
         let [width, height] = job.area();
         let per_side = match job.light {
             Light::Photons { .. } => 1,
@@ -184,6 +195,7 @@ impl GpuPaths<'_> {
         let image = technique.image.map_or(0, |i| size_of_val(i.pixels()));
         let corners = submissions::corner_bytes(&job);
         let largest = (4 * layout.words()).max(image).max(corners) as u64;
+        let largest = largest.max(media.map_or(0, FrameMedia::largest_buffer));
         let binding = self.gpu().binding_bytes();
         if largest > binding {
             return Err(refused(format!(
@@ -196,6 +208,7 @@ impl GpuPaths<'_> {
         let buffers = 1
             + u32::from(image > 0)
             + u32::from(exposure.solids.is_some())
+            + media.map_or(0, FrameMedia::buffers)
             + on_device.field_buffers();
         if buffers > on_device.gpu.storage_buffers() {
             return Err(refused(format!(
@@ -304,6 +317,7 @@ mod tests {
             framing,
             layout: FilmLayout::of_picture::<1>(&framing, false),
             technique: &broken,
+            media: None,
             light: Light::Photons { passes: 0..1 },
             filter: Some(&[1.0]),
             cancel: &AtomicBool::new(false),

@@ -20,7 +20,7 @@ fn send(x: i32, y: i32, number: u32, ray: u32) {
         atomicAdd(&outcomes[select(STOPPED, TURNED, turned)], 1u);
         return;
     }
-    let energy = technique_energy(photon);
+    let energy = technique_energy(photon) * photon.left;
     var shift = photon.shift_m;
     if FROM_FILM {
         shift = vec2f(0.0);

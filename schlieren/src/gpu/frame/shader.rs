@@ -1,5 +1,6 @@
 //! Assembles the shaders of a frame: the march, and what the scene's light and technique need.
 
+use super::media::FrameMedia;
 use super::technique::TechniqueShader;
 use crate::gpu::kernel::Kernel;
 use crate::optics::SourceImage;
@@ -10,6 +11,8 @@ use rt_core::sampler::Sampling;
 pub(super) struct FrameShader<'a> {
     pub(super) march: Kernel,
     pub(super) technique: &'a TechniqueShader<'a>,
+    /// What dims the light on its way.
+    pub(super) media: Option<&'a FrameMedia<'a>>,
     /// Channels of the film: 1, or 3 for colours.
     pub(super) channels: usize,
     /// Whether each photon travels in the beam of its own source point.
@@ -59,6 +62,12 @@ impl FrameShader<'_> {
         } else {
             "fn is_behind_body(ray: u32) -> bool {\n    return false;\n}\n"
         };
+        text += &match self.media {
+            Some(media) => media.wgsl(),
+            None => "const MEDIA = false;\n\nfn passes_medium(image_point_m: vec2f, tilt: vec2f) \
+                     -> f32 {\n    return 1.0;\n}\n"
+                .to_string(),
+        };
         self.march.march() + &text
     }
 
@@ -104,8 +113,10 @@ mod tests {
     use crate::gpu::Method;
     use crate::gpu::kernel::FieldLayout;
     use crate::interpolate::Interpolant;
+    use crate::media::Volume;
     use crate::optics::{Optics, SourceShape};
     use crate::technique::{Technique, bos, interferogram, schlieren::Schlieren};
+    use glam::DVec3;
     use wgpu::naga;
 
     fn techniques() -> Vec<Technique> {
@@ -155,11 +166,21 @@ mod tests {
     #[test]
     fn every_shader_of_a_frame_is_valid_wgsl_for_every_device() {
         use naga::valid::{Capabilities, ValidationFlags, Validator};
+        let property = Volume::new([2; 3], [1.0; 3], DVec3::ZERO, vec![1.0; 8], None).unwrap();
         let mut checked = 0;
         for technique in &techniques() {
             let of_technique = TechniqueShader::new(technique, 1.0).unwrap();
             for k in 0..8u32 {
                 let source = technique.optics().source_image();
+                let media = FrameMedia {
+                    absorption: (k & 1 != 0).then_some(&property),
+                    rotation: (k & 2 != 0).then_some(&property),
+                    analyser_rad: (k & 2 != 0).then_some(0.5),
+                    bent: k & 4 != 0,
+                    step_voxels: 1.0,
+                    origin_m: DVec3::ZERO,
+                    cache: None,
+                };
                 let shader = FrameShader {
                     march: Kernel {
                         method: Method::ALL[(k % 5) as usize],
@@ -170,6 +191,7 @@ mod tests {
                         layout: FieldLayout::Slabs(1),
                     },
                     technique: &of_technique,
+                    media: (k & 3 != 0).then_some(&media),
                     channels: if k & 2 == 0 { 1 } else { 3 },
                     tilted_beams: k & 4 != 0,
                     from_film: technique.samples_from_film(),

@@ -53,6 +53,11 @@ fn between(line: Line, last: f32, so_far: vec4f) -> vec4f {
 
 // The ray that starts at a point of the plane, in the frame of the image.
 fn undisturbed(image_point: vec2f, image_tilt: vec2f) -> Undisturbed {
+    return undisturbed_in_steps(image_point, image_tilt, frame.step_voxels);
+}
+
+// That ray in steps of this length at most, as high and low part.
+fn undisturbed_in_steps(image_point: vec2f, image_tilt: vec2f, step_voxels: vec2f) -> Undisturbed {
     let position = vec2f(frame.mirror * image_point.x, image_point.y);
     let tilt = vec2f(frame.mirror * image_tilt.x, image_tilt.y);
     var out: Undisturbed;
@@ -84,7 +89,7 @@ fn undisturbed(image_point: vec2f, image_tilt: vec2f) -> Undisturbed {
         sum(product(chord[1], chord[1]), product(chord[2], chord[2])),
     );
     // A tiny excess over a whole number is rounding and adds no step.
-    let steps = product(quotient(root(squares), frame.step_voxels), vec2f(1.0, -1e-12));
+    let steps = product(quotient(root(squares), step_voxels), vec2f(1.0, -1e-12));
     let count = max(whole_from(steps), 1.0);
     let per_step = vec2f(count, 0.0);
     let middle = array(

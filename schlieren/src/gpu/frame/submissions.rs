@@ -60,7 +60,7 @@ impl<'a> FrameOnDevice<'a> {
         on_device: &DeviceState,
         job: &Job<'a>,
     ) -> Result<FrameOnDevice<'a>, GpuError> {
-        let Job { exposure, technique, layout, .. } = job;
+        let Job { exposure, technique, layout, media, .. } = job;
         let from_film = exposure.technique.samples_from_film();
         let optics = exposure.technique.optics();
         let mut params = FrameParams::new(
@@ -79,6 +79,7 @@ impl<'a> FrameOnDevice<'a> {
         let shader = FrameShader {
             march: on_device.kernel,
             technique,
+            media: *media,
             channels: layout.channels(),
             tilted_beams: exposure.tilted_beams,
             from_film,
@@ -116,6 +117,11 @@ impl<'a> FrameOnDevice<'a> {
             .map(|_| gpu.checked(|| gpu.buffer(4 * rays.div_ceil(32), storage | to_device)))
             .transpose()?;
         paths.work.add_to_device(march.size());
+        let media = media.map(|m| m.to_device(&gpu, &paths.frame)).transpose()?;
+        if let Some((_, bytes)) = &media {
+            paths.work.add_to_device(*bytes);
+        }
+        let of_media = || media.iter().flat_map(|(m, _)| m.bindings());
         let mut of_march = vec![(0, march.as_entire_binding())];
         of_march.extend(on_device.field_bindings());
         let mut kernels = Vec::new();
@@ -125,6 +131,7 @@ impl<'a> FrameOnDevice<'a> {
                 let mut own = vec![(0, frame.as_entire_binding()), (1, film.as_entire_binding())];
                 own.extend(image.as_ref().map(|i| (3, i.as_entire_binding())));
                 own.extend(bodies.as_ref().map(|b| (4, b.as_entire_binding())));
+                own.extend(of_media());
                 let groups = gpu.bind(&pipeline, [&of_march, &own])?;
                 kernels.push((pipeline, groups));
             }
@@ -137,6 +144,7 @@ impl<'a> FrameOnDevice<'a> {
                     vec![(0, frame.as_entire_binding()), (2, corners.as_entire_binding())];
                 own.extend(image.as_ref().map(|i| (3, i.as_entire_binding())));
                 own.extend(bodies.as_ref().map(|b| (4, b.as_entire_binding())));
+                own.extend(of_media());
                 let groups = gpu.bind(&pipeline, [&of_march, &own])?;
                 kernels.push((pipeline, groups));
                 let pipeline = gpu.pipeline(shader.triangles(), "distribute_cells")?;
