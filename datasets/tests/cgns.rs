@@ -3,7 +3,7 @@
 
 mod peer;
 
-use datasets::model::{Dataset, StructuredGrid, UnstructuredGrid, Values};
+use datasets::model::{Dataset, StructuredGrid, UnstructuredGrid, Values, WALL_POINTS};
 use datasets::read::{LoadedFile, OpenOptions, open, open_with};
 use datasets::resample::Mesh;
 use glam::DVec3;
@@ -136,6 +136,27 @@ fn polyhedra_of_faces_are_the_shapes_that_they_are() {
         assert!(at(0).dot(at(1).cross(at(2))) > 0.0, "{ids:?}");
     }
     assert!(!opened.warnings.join("\n").contains("signs"), "{:?}", opened.warnings);
+}
+
+#[test]
+fn boundary_conditions_of_cgns_say_which_points_are_those_of_walls() {
+    let opened = read("walls.cgns");
+    let walls = |data: &Dataset| {
+        let ids = data.attributes().unwrap().field_array(WALL_POINTS)?;
+        Some((0..ids.tuples()).map(|i| ids.get(i, 0) as usize).collect::<Vec<_>>())
+    };
+    let zones = blocks(&opened);
+    let of = |name: &str| walls(zones.iter().find(|z| z.0 == name).unwrap().1);
+    // The floor, and the side up to its last face: points (3, 0..=2, 0..=1).
+    assert_eq!(of("lattice").unwrap(), [0, 1, 2, 3, 7, 11, 12, 13, 14, 15, 19, 23]);
+    assert_eq!(of("elements").unwrap(), [0, 1, 2, 3]);
+    assert_eq!(of("points").unwrap(), [4, 5]);
+    assert_eq!(of("unknown"), None);
+    let warned = opened.warnings.join("\n");
+    assert!(warned.contains("points`: 1 points of walls do not exist"), "{warned}");
+    // Files without conditions say nothing of walls.
+    let none = read("elements.cgns");
+    assert!(blocks(&none).iter().all(|z| walls(z.1).is_none()));
 }
 
 #[test]

@@ -276,7 +276,56 @@ def cgns_links(name):
     f.link("Base/again", "/Base/linked")
 
 
+def cgns_walls(name):
+    """Zones with boundary conditions: of ranges, lists, faces, elements and families."""
+    f = Cgns(name)
+    f.node("Base", "CGNSBase_t", np.array([3, 3], "i4"))
+    f.node("Base/Body", "Family_t")
+    f.node("Base/Body/FamilyBC", "FamilyBC_t", "BCWallViscous")
+    f.node("Base/Far", "Family_t")
+    f.node("Base/Far/FamilyBC", "FamilyBC_t", "BCFarfield")
+
+    def condition(path, kind, indices, label="PointRange", location=None, family=None):
+        f.node(path, "BC_t", kind)
+        is_range = label.endswith("Range")
+        f.node(f"{path}/{label}", "IndexRange_t" if is_range else "IndexArray_t",
+               np.array(indices, "i4"))
+        if location:
+            f.node(f"{path}/GridLocation", "GridLocation_t", location)
+        if family:
+            f.node(f"{path}/FamilyName", "FamilyName_t", family)
+
+    z, y, x = np.mgrid[0:2, 0:3, 0:4] * 1.0
+    # The plane j = 1 by points, the plane i = 4 by faces, and a far field.
+    f.zone("Base/lattice", [[4, 3, 2], [3, 2, 1], [0, 0, 0]], [x, y, z])
+    f.node("Base/lattice/ZoneBC", "ZoneBC_t")
+    bc = "Base/lattice/ZoneBC"
+    condition(f"{bc}/floor", "BCWallInviscid", [[1, 1, 1], [4, 1, 2]])
+    condition(f"{bc}/side", "FamilySpecified", [[4, 1, 1], [4, 2, 1]], location="IFaceCenter",
+              family="Body")
+    condition(f"{bc}/far", "FamilySpecified", [[1, 1, 1], [1, 3, 2]], family="Far")
+    # A hexahedron with its bottom and its side at x = 1 as elements; the bottom is a wall.
+    f.zone("Base/elements", [[8], [1], [0]], CUBE.T, "Unstructured")
+    f.section("Base/elements/Solids", 17, [[1, 2, 3, 4, 5, 6, 7, 8]], 1)
+    f.section("Base/elements/Border", 7, [[1, 4, 3, 2], [2, 3, 7, 6]], 2)
+    f.node("Base/elements/ZoneBC", "ZoneBC_t")
+    bc = "Base/elements/ZoneBC"
+    condition(f"{bc}/bottom", "BCWall", [[2, 2]], location="FaceCenter")
+    condition(f"{bc}/outlet", "BCOutflow", [[3]], "PointList", location="FaceCenter")
+    # By points, with a name alone, and a number that no point has.
+    f.zone("Base/points", [[8], [1], [0]], (CUBE + [0, 0, 5]).T, "Unstructured")
+    f.section("Base/points/Solids", 17, [[1, 2, 3, 4, 5, 6, 7, 8]], 1)
+    f.node("Base/points/ZoneBC", "ZoneBC_t")
+    condition("Base/points/ZoneBC/wing", "UserDefined", [[5, 6, 99]], "PointList")
+    # Names and types that say nothing.
+    f.zone("Base/unknown", [[8], [1], [0]], (CUBE + [0, 0, 9]).T, "Unstructured")
+    f.section("Base/unknown/Solids", 17, [[1, 2, 3, 4, 5, 6, 7, 8]], 1)
+    f.node("Base/unknown/ZoneBC", "ZoneBC_t")
+    condition("Base/unknown/ZoneBC/part 7", "Null", [[1, 2]], "PointList")
+
+
 if __name__ == "__main__":
+    cgns_walls("walls.cgns")
     cgns_zones("zones.cgns")
     cgns_elements("elements.cgns")
     cgns_links("links.cgns")

@@ -3,10 +3,11 @@
 //!
 //! Files in HDF5 are read, those in the older ADF are recognized. Rind planes and elements of the
 //! boundary are left out, polyhedra are built of their faces, and values with units become those
-//! of SI.
+//! of SI. Boundary conditions tell which points are those of walls.
 //!
 //! Source: "CGNS Standard Interface Data Structures" (SIDS) 4.4.
 
+mod boundary;
 mod connectivity;
 mod element;
 mod polyhedra;
@@ -146,6 +147,10 @@ fn zones_of(
         }
         let zone = Zone::new(tree, node, cell_axes as usize, &units)?;
         let mut data = dataset(&zone, step, notes)?;
+        let walls = boundary::wall_points(&zone, children, &mut notes.warnings)?;
+        if let (Some(walls), Some(attributes)) = (walls, data.attributes_mut()) {
+            attributes.field.push(walls);
+        }
         if let (Some(step), Some(attributes)) = (step, data.attributes_mut()) {
             let time = Values::F64(vec![step.time]);
             attributes.field.push(DataArray::new("TimeValue", 1, time));

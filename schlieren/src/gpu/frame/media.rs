@@ -97,11 +97,7 @@ impl<'a> FrameMedia<'a> {
     ///
     /// # Errors
     /// If the device fails.
-    pub(super) fn to_device(
-        &self,
-        gpu: &Gpu,
-        march: &Frame,
-    ) -> Result<(DeviceMedia, u64), GpuError> {
+    pub(super) fn upload(&self, gpu: &Gpu, march: &Frame) -> Result<(DeviceMedia, u64), GpuError> {
         let numbers = self.numbers(march);
         let numbers = gpu.checked(|| {
             let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;

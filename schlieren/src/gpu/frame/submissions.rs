@@ -117,7 +117,7 @@ impl<'a> FrameOnDevice<'a> {
             .map(|_| gpu.checked(|| gpu.buffer(4 * rays.div_ceil(32), storage | to_device)))
             .transpose()?;
         paths.work.add_to_device(march.size());
-        let media = media.map(|m| m.to_device(&gpu, &paths.frame)).transpose()?;
+        let media = media.map(|m| m.upload(&gpu, &paths.frame)).transpose()?;
         if let Some((_, bytes)) = &media {
             paths.work.add_to_device(*bytes);
         }
