@@ -84,28 +84,23 @@ impl<'a> MediaIntegrator<'a> {
         &self.frame.view
     }
 
-    /// The same on a device; `None` for rays that bend strongly.
-    #[cfg(feature = "gpu")]
-    pub(crate) fn on_device(
-        &self,
-        analyser_rad: Option<f64>,
-        cache: Option<&'a crate::gpu::MediaCache>,
-    ) -> Option<crate::gpu::FrameMedia<'a>> {
-        let [absorption, _, rotation] = self.wanted;
-        let bent = match self.bend_field {
-            BendField::Straight => false,
-            BendField::Paraxial(_) => true,
-            BendField::Full(_) => return None,
-        };
-        Some(crate::gpu::FrameMedia {
-            absorption,
-            rotation,
-            analyser_rad,
-            bent,
-            step_voxels: self.step_voxels,
-            origin_m: self.field.origin_m(),
-            cache,
-        })
+    /// The properties that are integrated, in the order of [`Property::ALL`].
+    pub fn properties(&self) -> [Option<&'a Volume>; 3] {
+        self.wanted
+    }
+
+    /// How rays bend.
+    pub fn bend(&self) -> Bend {
+        match self.bend_field {
+            BendField::Straight => Bend::Straight,
+            BendField::Paraxial(_) => Bend::Paraxial,
+            BendField::Full(_) => Bend::Full,
+        }
+    }
+
+    /// Longest step, in lattice steps of the field.
+    pub fn step_voxels(&self) -> f64 {
+        self.step_voxels
     }
 
     /// Whether a node of this kind ends a ray.

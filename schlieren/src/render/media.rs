@@ -11,6 +11,8 @@
 use super::planned::PlannedPaths;
 use super::{Layers, RenderError, RenderOutput, TestSection, technique};
 use crate::march::BlankCells;
+#[cfg(feature = "gpu")]
+use crate::media::Bend;
 use crate::media::{AttenuatedPaths, Media, MediaIntegrals, MediaIntegrator, Property};
 use crate::path::Start;
 use crate::scene::{Scene, TechniqueSpec};
@@ -67,8 +69,7 @@ impl TestSection {
         let (analyser, rays) = (scene.media.analyser_rad(), Arc::clone(&planned.media_rays));
         #[cfg(feature = "gpu")]
         if planned.on_device.is_some() {
-            let cache = self.caches.get(line).map(|c| &c.media);
-            planned.media_on_device = integrator.on_device(analyser, cache);
+            planned.media_on_device = self.media_on_device(&integrator, line, analyser);
             if planned.media_on_device.is_none() {
                 planned.on_device = None;
                 planned.warnings.push(
@@ -79,6 +80,31 @@ impl TestSection {
         }
         planned.paths = Box::new(AttenuatedPaths::new(planned.paths, integrator, analyser, rays));
         Ok(planned)
+    }
+
+    /// The same integration on a device; `None` for rays that bend strongly.
+    #[cfg(feature = "gpu")]
+    fn media_on_device<'a>(
+        &'a self,
+        integrator: &MediaIntegrator<'a>,
+        line: usize,
+        analyser_rad: Option<f64>,
+    ) -> Option<crate::gpu::FrameMedia<'a>> {
+        let [absorption, _, rotation] = integrator.properties();
+        let bent = match integrator.bend() {
+            Bend::Straight => false,
+            Bend::Paraxial => true,
+            Bend::Full => return None,
+        };
+        Some(crate::gpu::FrameMedia {
+            absorption,
+            rotation,
+            analyser_rad,
+            bent,
+            step_voxels: integrator.step_voxels(),
+            origin_m: self.fields[line].origin_m(),
+            cache: self.caches.get(line).map(|c| &c.media),
+        })
     }
 
     fn media_integrator<'a>(

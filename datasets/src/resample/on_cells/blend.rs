@@ -209,8 +209,8 @@ impl Group {
         out
     }
 
-    /// Value and gradient with factors for the terms of each degree, and the derivative of the value
-    /// by the share of whole corners, which makes the factors. Terms are in the order of
+    /// Value and gradient with factors for the terms of each degree, and the derivative of the
+    /// value by the share of whole corners, which makes the factors. Terms are in the order of
     /// `polynomial::monomials`.
     #[inline(always)]
     fn cubic(&self, at: [f32; 3], share: &Share, [f1, f2, f3]: [f32; 3]) -> ([Lane; 4], Lane) {

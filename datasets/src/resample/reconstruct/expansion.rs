@@ -7,15 +7,12 @@ use super::least_squares::NormalEquations;
 use super::neighbours::Neighbourhood;
 use super::polynomial::{TERMS, TERMS_TO_DEGREE, means, monomials};
 use super::quartic;
+use super::sample::{NEAREST_SQUARE, Sample, within};
 use crate::resample::mesh::Mesh;
 use glam::DVec3;
 
 /// Equations for each unknown, at least.
 const EQUATIONS_PER_TERM: f64 = 1.25;
-
-/// Samples nearer than this, squared and in the frame, weigh as if they were there: a point twice
-/// in the mesh, or a cell around the point.
-pub(super) const NEAREST_SQUARE: f64 = 0.2;
 
 /// A polynomial whose residual, as a part of the variation around the point, is below the first
 /// number is used as it is; from the second on, it is not used. Steps and noise leave more than the
@@ -223,18 +220,6 @@ fn frame_of(spread: [f64; 6]) -> Option<[f32; 6]> {
     frame.iter().all(|x| x.is_finite()).then_some(frame)
 }
 
-/// A value at a place, and its distance from the point, squared, in the frame.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Sample {
-    pub(super) square: f64,
-    id: u32,
-    pub(super) value: f64,
-    /// Mean position in the frame.
-    pub(super) place: DVec3,
-    /// Second moments in the frame.
-    second: [f64; 6],
-}
-
 /// The fitting of one polynomial; memory that is used again.
 #[derive(Default)]
 pub(super) struct Fit {
@@ -416,13 +401,6 @@ fn spline_at(samples: &[Sample], counts: Counts, free: bool) -> [f64; SPLINE] {
 /// Most files have values in f32. Where these differ by rounding only, there is nothing to limit.
 fn rounding(value: f64) -> f64 {
     value.abs() * f64::from(f32::EPSILON)
-}
-
-/// The `wanted` nearest samples, and those that are as near as the last of them.
-fn within(samples: &[Sample], wanted: usize) -> &[Sample] {
-    let Some(last) = samples.get(wanted.saturating_sub(1)) else { return samples };
-    let end = samples.partition_point(|s| s.square <= last.square * (1.0 + 1e-6));
-    &samples[..end]
 }
 
 /// The share of a polynomial that is used: 1 for small residuals, 0 for large ones, smooth between.

@@ -26,6 +26,7 @@ mod least_squares;
 mod neighbours;
 mod polynomial;
 mod quartic;
+mod sample;
 
 pub(super) use expansion::{Expansion, FACTOR_FALL, UNRESOLVED, factors};
 pub(super) use polynomial::TERMS;

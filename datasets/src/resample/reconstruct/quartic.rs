@@ -11,9 +11,9 @@
 //! errors of 2e-4.
 
 use super::counts::Counts;
-use super::expansion::{NEAREST_SQUARE, Sample};
 use super::least_squares::NormalEquations;
 use super::polynomial::{TERMS, TERMS_TO_DEGREE, monomials};
+use super::sample::{NEAREST_SQUARE, Sample};
 use glam::DVec3;
 
 /// Number of monomials of degree 1 to 4.
