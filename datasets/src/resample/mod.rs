@@ -245,9 +245,9 @@ pub struct ResampledField {
     pub lattice: Lattice,
     /// Values at the nodes, x fastest; NaN where the mark is not [`Mark::Inside`].
     pub values: Vec<f32>,
-    /// About the error that the mesh itself makes, whatever the lattice: by how much the values
-    /// differ from the plain mean of the corners' polynomials, which is of an order less. Where
-    /// none fits, 1.75 times what the spline in its place adds to the linear elements. Empty with
+    /// About the error that the mesh itself makes, whatever the lattice: four times what the values
+    /// gain over the plain mean of the corners' polynomials, which is of an order less. Where none
+    /// fits, 1.75 times what the spline in its place adds to the linear elements. Empty with
     /// [`Reconstruction::Linear`], which has nothing to compare with.
     pub truncation: Vec<f32>,
     /// The mark of each node.

@@ -4,7 +4,7 @@
 //! Coefficients are f32 in memory already. Values are taken relative to the first corner's, and
 //! places to its place, so that f32 keeps the digits of differences.
 
-use crate::resample::reconstruct::{Expansion, FACTOR_FALL, TERMS, UNRESOLVED, factors};
+use crate::resample::reconstruct::{CAUTION, Expansion, FACTOR_FALL, TERMS, UNRESOLVED, factors};
 use glam::DVec3;
 
 /// Corners that are evaluated at once.
@@ -38,9 +38,10 @@ pub(super) fn set(shares: &mut [Share], i: usize, n: f64, gradient: DVec3) {
 pub(super) enum Mean {
     /// With [`factors`] for their terms, if the shares of the corners allow it.
     Exact,
-    /// Of the polynomials themselves, which is less accurate, and with another part of those that
-    /// are not whole ([`UNRESOLVED`]).
-    Plain,
+    /// It differs from the exact one by an estimate of the error: what that gains over the mean of
+    /// the polynomials themselves ([`CAUTION`]), and a part of those that are not whole
+    /// ([`UNRESOLVED`]).
+    Doubted,
 }
 
 /// What a corner contributes.
@@ -61,6 +62,7 @@ pub(super) struct Polynomials {
     linear: bool,
     /// Whether factors change from place to place: some polynomials are whole.
     mixed: bool,
+    factors_of_share: f64,
 }
 
 /// Those of four corners: a lane for each.
@@ -105,12 +107,15 @@ impl Polynomials {
         self.groups.resize(corners.len().div_ceil(LANES), EMPTY);
         self.linear = true;
         let is_whole = |c: &Corner<'_>| c.expansion.is_some_and(Expansion::is_whole);
-        let whole = match mean == Mean::Exact && of_element {
-            true => corners.clone().filter(is_whole).count(),
-            false => 0,
+        let whole = if of_element { corners.clone().filter(is_whole).count() } else { 0 };
+        // How much of a share's factors is used: 1, or less by what is doubted.
+        self.factors_of_share = match mean {
+            Mean::Exact => 1.0,
+            Mean::Doubted => 1.0 - CAUTION,
         };
         self.mixed = whole > 0 && whole < corners.len();
-        let factors = factors(f64::from(u8::from(whole == corners.len()))).map(|f| f as f32);
+        let all = if whole == corners.len() { self.factors_of_share } else { 0.0 };
+        let factors = factors(all).map(|f| f as f32);
         for (i, corner) in corners.enumerate() {
             if i == 0 {
                 self.value = corner.value;
@@ -124,7 +129,7 @@ impl Polynomials {
             let Some(expansion) = corner.expansion else { continue };
             self.linear = false;
             let mut parts = expansion.parts();
-            if mean == Mean::Plain && !expansion.is_whole() {
+            if mean == Mean::Doubted && !expansion.is_whole() {
                 parts = parts.times((1.0 - UNRESOLVED) as f32);
             }
             for (lane, f) in group.frame.iter_mut().zip(parts.frame) {
@@ -171,7 +176,8 @@ impl Polynomials {
             whole += of(&share.n);
             slope += DVec3::from([0, 1, 2].map(|a| of(&share.gradient[a])));
         }
-        let factors = factors(whole).map(|f| f as f32);
+        let factors = factors(self.factors_of_share * whole).map(|f| f as f32);
+        let slope = self.factors_of_share * slope;
         let (mut sum, mut by_whole) = ([0.0f64; 4], 0.0);
         for (group, share) in self.groups.iter().zip(shares) {
             let (lanes, more) = group.cubic(at, share, factors);

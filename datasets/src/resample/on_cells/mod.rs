@@ -282,10 +282,10 @@ impl CellField {
     }
 
     /// A walker whose values differ from those of [`CellField::walker`] by the error that the mesh
-    /// itself makes, about: those of a less accurate mean of the same polynomials. See
+    /// itself makes, about: by what means of the same polynomials differ. See
     /// [`super::ResampledField::truncation`].
     pub fn walker_of_lower_order(&self) -> CellWalker<'_> {
-        CellWalker::new(self, Mean::Plain)
+        CellWalker::new(self, Mean::Doubted)
     }
 
     /// The median of the values on those faces of the border that lie in the sides of the mesh's

@@ -28,7 +28,7 @@ mod polynomial;
 mod quartic;
 mod sample;
 
-pub(super) use expansion::{Expansion, FACTOR_FALL, UNRESOLVED, factors};
+pub(super) use expansion::{CAUTION, Expansion, FACTOR_FALL, UNRESOLVED, factors};
 pub(super) use polynomial::TERMS;
 
 use super::mesh::{Mesh, Shape};
@@ -153,8 +153,8 @@ impl<'a> PointField<'a> {
         }
     }
 
-    /// The value at `p` in the cell with these corners, from their shares there, and by how much a
-    /// less accurate mean of the same polynomials differs.
+    /// The value at `p` in the cell with these corners, from their shares there, and an
+    /// estimate of its error: how much less accurate means of the same polynomials differ.
     pub(super) fn at(&self, mesh: &Mesh, corners: &[u32], weights: &[f64], p: DVec3) -> [f64; 2] {
         let is_whole = |id: u32| self.expansions.get(id as usize).is_some_and(Expansion::is_whole);
         let whole = match self.shares(corners) {
@@ -179,7 +179,7 @@ impl<'a> PointField<'a> {
                 sum[0] += weight * (value + change);
                 sum[1] += weight
                     * match expansion.is_whole() {
-                        true => expansion.change(d, [1.0; 3]) - change,
+                        true => CAUTION * (expansion.change(d, [1.0; 3]) - change),
                         false => UNRESOLVED * change,
                     };
             }
