@@ -168,8 +168,8 @@ pub(in crate::resample) fn factors(whole: f64) -> [f64; 3] {
     [1.0, 2.0, 3.0].map(|k| 1.0 - FACTOR_FALL * k * whole)
 }
 
-/// What [`factors`] gain over the mean of the polynomials themselves, times this, is the estimate of
-/// the error. Once would be above the error of bells; in layers two cells thick, polynomials are
+/// What [`factors`] gain over the mean of the polynomials themselves, times this, is the estimate
+/// of the error. Once would be above the error of bells; in layers two cells thick, polynomials are
 /// wrong by more than they differ: up to three times, of thirty gases on two meshes and two views.
 pub(in crate::resample) const CAUTION: f64 = 4.0;
 

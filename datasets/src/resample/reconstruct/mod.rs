@@ -8,9 +8,9 @@
 //! ([`super::shape`]). This is a partition of unity (Melenk and Babuška, "The partition of unity
 //! finite element method", 1996). With factors for the terms of each degree ([`factors`]) it is
 //! continuous, exact for fields of fourth degree, and with an error of fifth order in the size of
-//! the cells (fourth order for gradients) where the field is smooth. The test
-//! `a_bell_at_scattered_points_gives_its_deflections` of schlieren had 3e-3 of the largest deflection
-//! with the plain mean of cubic fits.
+//! the cells (fourth order for gradients) where the field is smooth. With the plain mean of cubic
+//! fits, schlieren's test `a_bell_at_scattered_points_gives_its_deflections` had errors of 3e-3 of
+//! the largest deflection.
 //!
 //! Where no polynomial fits, as at shocks, the mesh does not tell where in a cell the field
 //! changes. Slopes and curvature of a cubic B-spline with the values as its coefficients take the
