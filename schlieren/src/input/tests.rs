@@ -60,6 +60,14 @@ fn differences_of_a_billionth_keep_their_digits() {
 fn axes_that_run_backwards_and_cell_arrays() {
     let data = image([4, 3, 3], vec![("rho", false, ramp(12, 1.0, 0.1))]);
     let cells = from_dataset(&data, &Options::new(Medium::density("rho"))).unwrap().field;
+    // The nodes are the corners of the cells.
+    assert_eq!(cells.dims(), [4, 3, 3]);
+    assert!((cells.origin_m() - DVec3::new(1.0, 2.0, 3.0)).length() < 1e-12);
+    // A body of a cell without value has the cell's faces: the nodes are the centres.
+    let mut with_hole = ramp(12, 1.0, 0.1);
+    with_hole[4] = f64::NAN;
+    let data = image([4, 3, 3], vec![("rho", false, with_hole)]);
+    let cells = from_dataset(&data, &Options::new(Medium::density("rho"))).unwrap().field;
     assert_eq!(cells.dims(), [3, 2, 2]);
     assert!((cells.origin_m() - DVec3::new(1.05, 2.1, 3.15)).length() < 1e-12);
     let grid = RectilinearGrid {
