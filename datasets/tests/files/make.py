@@ -316,7 +316,10 @@ def cgns_walls(name):
     f.zone("Base/points", [[8], [1], [0]], (CUBE + [0, 0, 5]).T, "Unstructured")
     f.section("Base/points/Solids", 17, [[1, 2, 3, 4, 5, 6, 7, 8]], 1)
     f.node("Base/points/ZoneBC", "ZoneBC_t")
-    condition("Base/points/ZoneBC/wing", "UserDefined", [[5, 6, 99]], "PointList")
+    condition("Base/points/ZoneBC/wing", "UserDefined", [[5, 99]], "PointList")
+    # A range far beyond the points, and faces that no section has.
+    condition("Base/points/ZoneBC/long", "BCWall", [[7, 2000000000]])
+    condition("Base/points/ZoneBC/gone", "BCWall", [[70, 80]], location="FaceCenter")
     # Names and types that say nothing.
     f.zone("Base/unknown", [[8], [1], [0]], (CUBE + [0, 0, 9]).T, "Unstructured")
     f.section("Base/unknown/Solids", 17, [[1, 2, 3, 4, 5, 6, 7, 8]], 1)

@@ -31,14 +31,14 @@ pub(super) fn wall_points(
     warnings: &mut Vec<String>,
 ) -> Result<Option<DataArray>, Fault> {
     let tree = zone.tree;
-    let (mut is_known, mut places) = (false, Vec::new());
+    let (mut is_known, mut places): (bool, Vec<(String, Place)>) = (false, Vec::new());
     for conditions in zone.children.iter().filter(|c| c.label == "ZoneBC_t") {
         for condition in tree.children(conditions)?.iter().filter(|c| c.label == "BC_t") {
             let children = tree.children(condition)?;
             let is_wall = is_wall(tree, condition, &children, siblings)?;
             is_known |= is_wall.is_some();
             if is_wall == Some(true) {
-                places.push(place(&children)?);
+                places.push((condition.path.clone(), place(&children)?));
             }
         }
     }
@@ -48,19 +48,29 @@ pub(super) fn wall_points(
     let count = zone.points.iter().try_fold(1u64, |a, n| a.checked_mul(*n));
     let count = count.and_then(|n| usize::try_from(n).ok()).filter(|n| u32::try_from(*n).is_ok());
     let count = count.ok_or_else(|| zone.node.fault("it has too many points"))?;
-    let mut walls = Marked { of_points: vec![false; count], missing: 0 };
-    for place in &places {
+    let mut walls = Marked { of_points: vec![false; count], marked: 0, missing: 0 };
+    for (path, place) in &places {
+        let marked = walls.marked;
         if zone.is_structured {
             walls.mark_lattice(&zone.points, place);
         } else if place.faces {
             walls.mark_elements(zone, place)?;
         } else {
-            place.each(|id| walls.mark(id));
+            walls.mark_points(place);
+        }
+        if walls.marked == marked {
+            warnings.push(format!(
+                "the wall `{path}` has no points or faces that the file holds: its border is taken \
+                 as open; write its PointRange or PointList, and its faces as elements"
+            ));
         }
     }
     if walls.missing > 0 {
         let path = &zone.node.path;
-        warnings.push(format!("`{path}`: {} points of walls do not exist", walls.missing));
+        warnings.push(format!(
+            "`{path}`: walls name points beyond its own, {} times; these are left out",
+            walls.missing
+        ));
     }
     let ids = (0..).zip(walls.of_points).filter(|(_, is_wall)| *is_wall).map(|(id, _)| id);
     Ok(Some(DataArray::new(WALL_POINTS, 1, Values::U32(ids.collect()))))
@@ -123,18 +133,10 @@ fn place(children: &[Node]) -> Result<Place, Fault> {
 }
 
 impl Place {
-    /// Calls `f` with the numbers of an unstructured zone.
-    fn each(&self, mut f: impl FnMut(i64)) {
-        self.list.iter().for_each(|id| f(*id));
-        if let Some(range) = self.numbers() {
-            range.for_each(f);
-        }
-    }
-
+    /// The range of numbers of an unstructured zone.
     fn numbers(&self) -> Option<RangeInclusive<i64>> {
         match self.range.as_deref() {
-            // No zone has more.
-            Some(&[a, b]) => Some(a.min(b)..=a.max(b).min(i64::from(u32::MAX))),
+            Some(&[a, b]) => Some(a.min(b)..=a.max(b)),
             _ => None,
         }
     }
@@ -143,7 +145,8 @@ impl Place {
 /// The points of walls.
 struct Marked {
     of_points: Vec<bool>,
-    /// Points that do not exist.
+    /// How often a point was marked, and how often one that does not exist.
+    marked: usize,
     missing: usize,
 }
 
@@ -152,8 +155,21 @@ impl Marked {
     fn mark(&mut self, number: i64) {
         let index = number.checked_sub(1).and_then(|i| usize::try_from(i).ok());
         match index.and_then(|i| self.of_points.get_mut(i)) {
-            Some(is_wall) => *is_wall = true,
+            Some(is_wall) => {
+                *is_wall = true;
+                self.marked += 1;
+            }
             None => self.missing += 1,
+        }
+    }
+
+    /// Marks points by their numbers. A range goes on to the first point that does not exist, and
+    /// no further: it may end anywhere.
+    fn mark_points(&mut self, place: &Place) {
+        place.list.iter().for_each(|id| self.mark(*id));
+        if let Some(range) = place.numbers() {
+            let end = (*range.end()).min(self.of_points.len() as i64 + 1);
+            ((*range.start()).max(0)..=end).for_each(|id| self.mark(id));
         }
     }
 
@@ -195,6 +211,7 @@ impl Marked {
                     let index = i + rows[0] * (j + rows[1] * k);
                     if let Some(is_wall) = self.of_points.get_mut(index as usize) {
                         *is_wall = true;
+                        self.marked += 1;
                     }
                 }
             }
