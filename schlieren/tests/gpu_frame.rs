@@ -486,6 +486,16 @@ fn the_medium_is_copied_to_the_device_once() {
         out.report.device.unwrap().bytes_to_device
     });
     assert!(second + 4 * 20 * 20 * 20 <= first, "{first} {second}");
+
+    // Other smoke in the same section is not the one that the device has.
+    let clear = Volume::from_fn([20; 3], [0.05; 3], DVec3::splat(-0.5), |_| 0.0).unwrap();
+    let picture = |s: &TestSection| {
+        let out = render(&scene, s, Layers::NONE, &Control::default()).unwrap();
+        out.pixels.iter().map(|p| f64::from(p[0])).sum::<f64>()
+    };
+    let smoky = picture(&section);
+    let section = section.with_media(Media::default().with(Property::Absorption, clear));
+    assert!(picture(&section) > 1.01 * smoky);
 }
 
 #[test]

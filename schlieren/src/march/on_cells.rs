@@ -127,7 +127,7 @@ impl<'a> OnCells<'a> {
     }
 
     /// The same paths through less accurate values, which tell how accurate the mesh is
-    /// ([`datasets::resample::CellField::walker_of_lower_order`]).
+    /// ([`datasets::resample::CellField::walker_for_error_estimate`]).
     #[must_use]
     pub(crate) fn with_second_degree(self) -> OnCells<'a> {
         OnCells { to_second_degree: true, ..self }
@@ -215,7 +215,7 @@ impl<'a> OnCells<'a> {
         let free = lock().pop();
         let cells = self.gas.cells();
         let mut walker = free.unwrap_or_else(|| match self.to_second_degree {
-            true => cells.walker_of_lower_order(),
+            true => cells.walker_for_error_estimate(),
             false => cells.walker(),
         });
         let mut counters = CellCounters::default();

@@ -41,6 +41,9 @@ impl TestSection {
     pub fn with_media(mut self, media: Media) -> TestSection {
         self.warnings.extend(media.warnings());
         self.media = Some(media);
+        // A device has the values of what was there before.
+        #[cfg(feature = "gpu")]
+        self.caches.iter_mut().for_each(|c| c.media = Default::default());
         self
     }
 
@@ -73,7 +76,7 @@ impl TestSection {
             if planned.media_on_device.is_none() {
                 planned.on_device = None;
                 planned.warnings.push(
-                    "the index is so strong that absorption and rotation are integrated on the CPU"
+                    "a full march bends the rays, so the CPU integrates absorption and rotation"
                         .into(),
                 );
             }
