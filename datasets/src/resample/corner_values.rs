@@ -55,6 +55,14 @@ fn along(values: &[f64], dims: [usize; 3], axis: usize) -> Vec<f64> {
     }
     let inner: usize = dims[..axis].iter().product();
     let mut out = vec![0.0; values.len() / n * (n + 1)];
+    if axis == 0 {
+        // Row by row: a piece of one number would be too little work for a thread.
+        out.par_chunks_mut(n + 1).zip(values.par_chunks(n)).for_each(|(out, row)| {
+            let corners = out.iter_mut().enumerate();
+            corners.for_each(|(corner, to)| *to = at_corner(corner, n, |cell| row[cell]));
+        });
+        return out;
+    }
     // A piece of `inner` numbers is those of one corner along the axis.
     out.par_chunks_mut(inner).enumerate().for_each(|(piece, out)| {
         let (outer, corner) = (piece / (n + 1), piece % (n + 1));

@@ -6,8 +6,9 @@
 //!   └── prepared cell: planes, shares, polynomials ┴── walker: enter, sample, leave
 //! ```
 //! The value at a place is that of [`Reconstruction`]: the mean of the polynomials of the cell's
-//! corners, weighted by the shape functions of the element, f = Σ Nᵢ pᵢ. Its gradient is the
-//! exact one of this blend, Σ (Nᵢ ∇pᵢ + pᵢ ∇Nᵢ): an integral of the gradient along
+//! corners, weighted by the shape functions of the element, f = Σ Nᵢ pᵢ, with factors for the
+//! terms of each degree. Its gradient is the exact one of this blend, Σ (Nᵢ ∇pᵢ + pᵢ ∇Nᵢ), and
+//! where the factors change, a part along their gradient: an integral of the gradient along
 //! neighbouring lines is the change of the integral of the value between them. The value is
 //! continuous across faces. The gradient jumps there by the polynomials' differences by the size of
 //! the cell: by its third power where the field is smooth. (The faces of the shape functions of
@@ -284,7 +285,7 @@ impl CellField {
     /// A walker whose values differ from those of [`CellField::walker`] by the error that the mesh
     /// itself makes, about: by what means of the same polynomials differ. See
     /// [`super::ResampledField::truncation`].
-    pub fn walker_of_lower_order(&self) -> CellWalker<'_> {
+    pub fn walker_for_error_estimate(&self) -> CellWalker<'_> {
         CellWalker::new(self, Mean::Doubted)
     }
 
