@@ -5,29 +5,20 @@
 #![cfg(feature = "gpu")]
 
 mod common;
+mod device;
 
 use common::{cube, lopsided};
 use glam::DVec3;
 use schlieren::field::{Field, Node};
-use schlieren::gpu::Gpu;
 use schlieren::media::{Media, Property, Volume};
 use schlieren::render::{Control, Layers, RenderOutput, TestSection, render};
 use schlieren::scene::Scene;
 use schlieren::solids::Solids;
-use std::io::Write as _;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Whether there is a device. Without one, prints why the test is skipped.
 fn has_gpu() -> bool {
-    match Gpu::shared() {
-        Ok(_) => true,
-        Err(e) => {
-            assert!(std::env::var_os("RTSV_REQUIRE_PEERS").is_none_or(|v| v != "1"), "{e}");
-            // The test harness captures eprintln! of tests that pass.
-            let _ = writeln!(std::io::stderr(), "skipped: {e}");
-            false
-        }
-    }
+    device::gpu().is_some()
 }
 
 const PHOTONS: &str = "[sampling]\nmethod = \"photons\"\nsamples = 4\nseed = 77\n";
@@ -89,6 +80,12 @@ fn check_device(gpu: &RenderOutput, cpu: &RenderOutput, rest: &str) {
     assert_eq!(tally.not_a_number, 0);
 }
 
+/// Number of pixels of which a channel differs by more than is allowed.
+fn changed(a: &RenderOutput, b: &RenderOutput, allowed: f32) -> usize {
+    let off = |(a, b): &(&[f32; 3], &[f32; 3])| (0..3).any(|c| (a[c] - b[c]).abs() > allowed);
+    a.pixels.iter().zip(&b.pixels).filter(off).count()
+}
+
 /// Largest difference of the two images, and the largest brightness.
 fn difference(a: &RenderOutput, b: &RenderOutput) -> [f32; 2] {
     let mut worst = [0.0f32; 2];
@@ -141,8 +138,7 @@ fn photons_of_the_device_are_those_of_the_cpu() {
     for (name, technique) in techniques() {
         let film = if name == "shadowgraph" { "focus_m = 3.0\n" } else { "" };
         let [gpu, cpu] = both(&field, film, &format!("{technique}{PHOTONS}{NO_FILTER}"));
-        let off = |(a, b): &(&[f32; 3], &[f32; 3])| (0..3).any(|c| (a[c] - b[c]).abs() > 2e-5);
-        let changed = gpu.pixels.iter().zip(&cpu.pixels).filter(off).count();
+        let changed = changed(&gpu, &cpu, 2e-5);
         let [worst, brightest] = difference(&gpu, &cpu);
         assert!(changed <= 3, "{name}: {changed} pixels differ, by {worst} of {brightest}");
         let [low, high] = cpu.report.levels;
@@ -201,8 +197,7 @@ fn every_march_and_interpolant_exposes_the_frame_of_the_cpu() {
                 check_device(&gpu, &cpu, &rest);
                 assert!(gpu.report.march.starts_with(march), "{}", gpu.report.march);
                 assert!(gpu.report.march.contains(&format!("{interpolant},")));
-                let off = |(a, b): &(&[f32; 3], &[f32; 3])| (a[0] - b[0]).abs() > allowed;
-                let changed = gpu.pixels.iter().zip(&cpu.pixels).filter(off).count();
+                let changed = changed(&gpu, &cpu, allowed);
                 let [worst, _] = difference(&gpu, &cpu);
                 assert!(changed <= 3, "{march}, {interpolant}, {rest}: {changed}, {worst:e}");
             }
@@ -225,8 +220,7 @@ fn rays_that_turn_are_counted_and_dark_on_both() {
             exposed(&field, &scene)
         });
         check_device(&gpu, &cpu, &rest);
-        let off = |(a, b): &(&[f32; 3], &[f32; 3])| (a[0] - b[0]).abs() > 2e-5;
-        let changed = gpu.pixels.iter().zip(&cpu.pixels).filter(off).count();
+        let changed = changed(&gpu, &cpu, 2e-5);
         assert!(changed <= 3, "{rest}: {changed}, {:e}", difference(&gpu, &cpu)[0]);
         let is_beams = sampling == BEAMS;
         assert!(is_beams || gpu.report.tally.turned > 100, "{:?}", gpu.report.tally);
@@ -280,8 +274,7 @@ fn oblique_views_and_tilted_beams_start_where_they_do_on_the_cpu() {
         let sampling = if rest.contains("sampling") { "" } else { PHOTONS };
         let filter = if sampling.is_empty() { "" } else { NO_FILTER };
         let [gpu, cpu] = both(&field, "", &format!("{KNIFE}{rest}{sampling}{filter}"));
-        let off = |(a, b): &(&[f32; 3], &[f32; 3])| (a[0] - b[0]).abs() > 2e-5;
-        let changed = gpu.pixels.iter().zip(&cpu.pixels).filter(off).count();
+        let changed = changed(&gpu, &cpu, 2e-5);
         let [worst, _] = difference(&gpu, &cpu);
         assert!(changed <= 3, "{rest}: {changed} pixels differ, by up to {worst}");
     }
@@ -457,8 +450,7 @@ fn the_medium_dims_and_turns_the_light_of_a_frame_on_the_device() {
             let [gpu, cpu] =
                 ["gpu", "cpu"].map(|d| exposed_through_smoke(&field, &scene(d, "", &rest)));
             check_device(&gpu, &cpu, &rest);
-            let off = |(a, b): &(&[f32; 3], &[f32; 3])| (a[0] - b[0]).abs() > 5e-5;
-            let changed = gpu.pixels.iter().zip(&cpu.pixels).filter(off).count();
+            let changed = changed(&gpu, &cpu, 5e-5);
             let [worst, brightest] = difference(&gpu, &cpu);
             assert!(changed <= 3, "{rest}: {changed} pixels, {worst:e} of {brightest}");
             // The CPU traces corners of beams twice where its tiles meet.
@@ -563,8 +555,7 @@ fn meshes_of_bodies_cast_the_same_shadows() {
         let [a, b] = [&gpu, &cpu].map(|o| o.report.tally);
         assert_eq!(gpu.report.device.unwrap().photons, a.sent, "{:?}", gpu.report.warnings);
         assert_eq!((a.blocked_by_solids, a.landed), (b.blocked_by_solids, b.landed), "{rest}");
-        let off = |(a, b): &(&[f32; 3], &[f32; 3])| (a[0] - b[0]).abs() > 2e-5;
-        assert!(gpu.pixels.iter().zip(&cpu.pixels).filter(off).count() <= 3, "{rest}");
+        assert!(changed(&gpu, &cpu, 2e-5) <= 3, "{rest}");
         let dark = gpu.pixels.iter().filter(|p| p[0] == 0.0).count();
         assert!((40..400).contains(&dark), "{dark} pixels are dark: {rest}");
     }
