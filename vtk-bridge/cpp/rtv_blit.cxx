@@ -65,14 +65,16 @@ void RtvBlit::Upload(vtkRenderer* renderer, const RtvPicture& p, bool covered)
     texture->ResetFormatAndType();
     return texture.Get();
   };
-  if (this->Color && this->Blended != (p.blended != nullptr))
+  const int type = p.straight ? VTK_UNSIGNED_SHORT : p.blended ? VTK_FLOAT : VTK_UNSIGNED_CHAR;
+  if (this->Color && this->ColorType != type)
   {
     // A texture keeps the format of its first data.
     this->Color->ReleaseGraphicsResources(window);
     this->Color = nullptr;
   }
-  this->Blended = p.blended != nullptr;
-  this->Covered = covered && !this->Blended;
+  this->ColorType = type;
+  this->Blended = type == VTK_FLOAT;
+  this->Covered = p.straight || (covered && !this->Blended);
   this->Size[0] = static_cast<int>(p.width);
   this->Size[1] = static_cast<int>(p.height);
   if (this->Blended)
@@ -84,8 +86,8 @@ void RtvBlit::Upload(vtkRenderer* renderer, const RtvPicture& p, bool covered)
   }
   else
   {
-    ready(this->Color)->Create2DFromRaw(
-      p.width, p.height, 4, VTK_UNSIGNED_CHAR, const_cast<unsigned char*>(p.opaque));
+    const void* color = p.straight ? static_cast<const void*>(p.straight) : p.opaque;
+    ready(this->Color)->Create2DFromRaw(p.width, p.height, 4, type, const_cast<void*>(color));
   }
   ready(this->Depth)->CreateDepthFromRaw(
     p.width, p.height, vtkTextureObject::Float32, VTK_FLOAT, const_cast<float*>(p.depth));

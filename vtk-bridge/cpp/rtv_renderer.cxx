@@ -6,7 +6,9 @@
 // are drawn before its opaque props, the other pixels after them.
 #include "rtv_shim.h"
 
+#include <algorithm>
 #include <string>
+#include <vtkActor2D.h>
 #include <vtkFrameBufferObjectBase.h>
 #include <vtkObjectFactory.h>
 #include <vtkOpenGLFXAAFilter.h>
@@ -109,12 +111,14 @@ int vtkRtvRenderer::UpdateGeometry(vtkFrameBufferObjectBase* fbo)
     view.shadows = this->UseShadows ? 1 : 0;
     view.window_samples = rtvWindowSamples(this);
     covered = view.window_samples > 1;
+    const auto flat = [](vtkProp* prop) { return vtkActor2D::SafeDownCast(prop) != nullptr; };
+    view.one_layer = std::all_of(rest.begin(), rest.end(), flat) ? 1 : 0;
     drawn = rtvApi->render(this->Bridge, &view, &picture) != 0;
   }
   if (drawn)
   {
     this->Blit.Upload(this, picture, covered);
-    this->PictureIsBlended = picture.blended != nullptr;
+    this->PictureIsBlended = picture.blended != nullptr && picture.straight == nullptr;
   }
   rtvApi->end(this->Bridge);
   if (!drawn)

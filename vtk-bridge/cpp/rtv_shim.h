@@ -74,7 +74,11 @@ public:
 private:
   vtkOpenGLQuadHelper* Quad = nullptr;
   vtkSmartPointer<vtkTextureObject> Color, Depth, FirstDepth;
+  // Type of the numbers of Color.
+  int ColorType = 0;
+  // Colours are multiplied by their opacity, in two stages.
   bool Blended = false;
+  // Colours are not, and opacities are not all 0 or 1.
   bool Covered = false;
   int Size[2] = { 0, 0 };
 };

@@ -301,8 +301,8 @@ typedef struct RtvView {
   uint32_t shadows;
   /* Samples of each pixel of the framebuffer that the image is drawn into; 0 or 1 for none. With more, the alpha of opaque images is the part of the pixel that is covered. */
   uint32_t window_samples;
-  /* Not used. */
-  uint32_t reserved;
+  /* 1 when OpenGL draws nothing beside the image that is translucent or has a depth. */
+  uint32_t one_layer;
 } RtvView;
 /* An image; rows start at the top, and the memory belongs to the bridge until its next call. */
 typedef struct RtvPicture {
@@ -316,8 +316,10 @@ typedef struct RtvPicture {
   float const* blended;
   /* Window depth of the first opaque surface. */
   float const* depth;
-  /* Window depth of the first surface, or null without blended. */
+  /* Window depth of the first surface, or null without blended or with straight. */
   float const* first_depth;
+  /* blended as one layer, to be blended over everything with depth: RGBA, not premultiplied, 65535 for 1; null without one_layer or blended. */
+  uint16_t const* straight;
 } RtvPicture;
 /* Representation of a property: every point. */
 #define RTV_POINTS 0u
@@ -564,7 +566,7 @@ typedef struct RtvSceneVolume {
   double world_from_unit[16];
 } RtvSceneVolume;
 /* Version of this interface, computed from its structures and calls (a test gives the value). A shim built for another version must not continue. */
-#define RTV_ABI 3248043196u
+#define RTV_ABI 1760331924u
 /* All calls in one table, so that a shim needs only one symbol. */
 typedef struct RtvApi {
   /* rtv_abi. */

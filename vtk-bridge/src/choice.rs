@@ -256,7 +256,7 @@ mod tests {
     #[test]
     fn small_volumes_stay_and_large_ones_are_traced() {
         assert_eq!(last(volume(9, false, BEST)), Way::OpenGl);
-        assert_eq!(last(volume(9, true, BEST)), Way::OpenGl);
+        assert_eq!(last(volume(5, true, BEST)), Way::OpenGl);
         let found = ways(volume(257, false, BEST), 40);
         assert_eq!((found[0], found[39]), (Way::OpenGl, Way::All));
         let hardware = SceneFacts { software: false, ..volume(513, true, BEST) };

@@ -294,6 +294,7 @@ mod tests {
             shadows: false,
             samples: 0,
             window_samples: 0,
+            one_layer: false,
             lens: None,
         };
         (edges, view)

@@ -499,6 +499,9 @@ pub struct View {
     /// Samples of each of the window's pixels (`vtkRenderWindow::SetMultiSamples`): edges are as
     /// smooth as OpenGL would draw them. 0 or 1 for a window without; no more than 16 are taken.
     pub window_samples: u32,
+    /// OpenGL draws nothing beside the image that is translucent or has a depth. Images with
+    /// translucent pixels then come as one layer, [`crate::window_image::WindowImage::straight`].
+    pub one_layer: bool,
     /// The program's own lens.
     pub lens: Option<Lens>,
 }

@@ -33,6 +33,7 @@
 //!     shadows: false,
 //!     samples: 0,
 //!     window_samples: 0,
+//!     one_layer: false,
 //!     lens: None,
 //! };
 //! let image = bridge.render(&view)?;

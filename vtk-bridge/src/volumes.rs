@@ -4,7 +4,7 @@
 use crate::input::{Scalars, View, Volume as Input, VolumeBlend};
 use rayon::prelude::*;
 use rt_core::colormap::ColorMap;
-use rt_core::glam::{DAffine3, DMat3, DVec3, UVec3, Vec3};
+use rt_core::glam::{DAffine3, DMat3, DMat4, DVec3, DVec4, UVec3};
 use rt_core::grid::Grid;
 use rt_core::scene::VolumeInstance;
 use rt_core::transfer_function::TransferFunction;
@@ -258,38 +258,68 @@ fn straight(points: Vec<[f32; 2]>) -> Vec<[f32; 2]> {
 /// it, where that is in front of `depth`. What OpenGL draws nearer appears in front of the volume;
 /// what it draws further away is seen through the volume.
 pub(crate) fn place_in_depth(volumes: &[VolumeInstance], view: &View, depth: &mut [f32]) {
-    let world_from_clip = view.clip_from_world.inverse();
-    let boxes: Vec<(DAffine3, Vec3, Vec3)> = volumes
-        .iter()
-        .map(|v| {
-            let b = v.volume.bounds();
-            let to_object =
-                DAffine3::from_translation(-v.volume.origin()) * v.world_from_object.inverse();
-            (to_object, b.min, b.max)
-        })
-        .collect();
+    let boxes: Vec<BoxInClip> = volumes.iter().map(|v| BoxInClip::new(v, view)).collect();
     let width = view.width as usize;
-    depth.par_iter_mut().with_min_len(CHUNK).enumerate().for_each(|(i, depth)| {
-        let x = 2.0 * ((i % width) as f64 + 0.5) / f64::from(view.width) - 1.0;
-        let y = 1.0 - 2.0 * ((i / width) as f64 + 0.5) / f64::from(view.height);
-        let ends = [-1.0, 1.0].map(|z| world_from_clip.project_point3(DVec3::new(x, y, z)));
-        for (to_object, lo, hi) in &boxes {
-            let [a, b] = ends.map(|p| to_object.transform_point3(p));
-            let d = b - a;
-            let (mut near, mut far) = (0.0f64, 1.0f64);
-            for k in 0..3 {
-                let (u, v) = ((f64::from(lo[k]) - a[k]) / d[k], (f64::from(hi[k]) - a[k]) / d[k]);
-                // For rays parallel to the face, NaN and infinities either leave both ends
-                // unchanged or make the interval empty, as intended.
-                (near, far) = (near.max(u.min(v)), far.min(u.max(v)));
-            }
-            if near < far {
-                let middle = ends[0] + (ends[1] - ends[0]) * (0.5 * (near + far));
-                let z = view.clip_from_world.project_point3(middle).z;
-                *depth = depth.min((0.5 * z + 0.5) as f32);
+    depth.par_chunks_mut(width.max(1)).enumerate().for_each(|(row, depth)| {
+        let y = 1.0 - 2.0 * (row as f64 + 0.5) / f64::from(view.height);
+        for b in &boxes {
+            let ends = [-1.0, 1.0].map(|z| b.object_from_clip * DVec4::new(0.0, y, z, 1.0));
+            for (column, depth) in depth.iter_mut().enumerate() {
+                let x = 2.0 * (column as f64 + 0.5) / f64::from(view.width) - 1.0;
+                if let Some(middle) = b.middle(ends, x) {
+                    *depth = depth.min(middle);
+                }
             }
         }
     });
+}
+
+/// The box of a volume, for rays through pixels.
+struct BoxInClip {
+    object_from_clip: DMat4,
+    clip_from_object: DMat4,
+    min: DVec3,
+    max: DVec3,
+}
+
+impl BoxInClip {
+    fn new(v: &VolumeInstance, view: &View) -> BoxInClip {
+        let b = v.volume.bounds();
+        let to_object =
+            DAffine3::from_translation(-v.volume.origin()) * v.world_from_object.inverse();
+        let object_from_clip = DMat4::from(to_object) * view.clip_from_world.inverse();
+        BoxInClip {
+            object_from_clip,
+            clip_from_object: view.clip_from_world * DMat4::from(to_object.inverse()),
+            min: b.min.as_dvec3(),
+            max: b.max.as_dvec3(),
+        }
+    }
+
+    /// Window depth of the middle of the ray's segment in the box, for the ray through `x` of a row
+    /// whose ends at `x` = 0 are `ends`.
+    #[inline]
+    fn middle(&self, ends: [DVec4; 2], x: f64) -> Option<f32> {
+        let [a, b] = ends.map(|end| {
+            let end = end + x * self.object_from_clip.x_axis;
+            end.truncate() * end.w.recip()
+        });
+        let along = b - a;
+        let inverse = along.recip();
+        let (u, v) = ((self.min - a) * inverse, (self.max - a) * inverse);
+        let (mut near, mut far) = (0.0f64, 1.0f64);
+        for axis in 0..3 {
+            // For rays parallel to the face, NaN and infinities either leave both ends unchanged or
+            // make the interval empty, as intended.
+            near = near.max(u[axis].min(v[axis]));
+            far = far.min(u[axis].max(v[axis]));
+        }
+        (near < far).then(|| {
+            let middle = a + along * (0.5 * (near + far));
+            let clip = self.clip_from_object * middle.extend(1.0);
+            (0.5 * clip.z / clip.w + 0.5) as f32
+        })
+    }
 }
 
 #[cfg(test)]
@@ -331,6 +361,7 @@ mod tests {
             shadows: false,
             samples: 0,
             window_samples: 0,
+            one_layer: false,
             lens: None,
         };
         let mut depth = vec![1.0; 9];

@@ -28,8 +28,15 @@ pub struct WindowImage {
     pub blended: Vec<[f32; 4]>,
     /// Window depth of the first opaque surface, 1 where there is none.
     pub depth: Vec<f32>,
-    /// Window depth of the first surface, opaque or not; only with [`WindowImage::blended`].
+    /// Window depth of the first surface, opaque or not; only with [`WindowImage::blended`], and
+    /// without [`WindowImage::straight`].
     pub first_depth: Vec<f32>,
+    /// [`WindowImage::blended`] as one layer for [`View::one_layer`], else empty: RGBA, not
+    /// premultiplied, 65535 for 1. Opaque, with the colour of everything in front of it, where
+    /// [`WindowImage::depth`] is below 1. Blended over what OpenGL drew, with that depth, it gives
+    /// the window. Also empty where a pixel is brighter than its opacity allows, as in highlights,
+    /// because such a colour has no straight form below 1.
+    pub straight: Vec<[u16; 4]>,
 }
 
 /// Result of drawing.
@@ -79,17 +86,19 @@ impl WindowImage {
             ..inputs.options.clone()
         };
         let traced = Traced::new(renderer, inputs, &options, mixed)?;
-        let Traced { mut frame, lit_lines, mut first_depth, mut rays, warnings } = traced;
-        if effects.contains(Effects::VOLUMES) {
-            if first_depth.is_empty() {
-                first_depth.clone_from(&frame.depth);
-            }
-            crate::volumes::place_in_depth(&inputs.scene.volumes, view, &mut first_depth);
-        }
+        let Traced { mut frame, lit_lines, mut rays, warnings } = traced;
+        let opaque_background = !matches!(inputs.scene.background, Background::Transparent);
+        // One layer needs no depth of what is translucent, but to clear the background and to hide
+        // lines.
+        let one_layer = view.one_layer && !opaque_background && inputs.edges.is_empty();
+        let mut first_depth = if one_layer {
+            Vec::new()
+        } else {
+            first_depth(renderer, inputs, &options, view, &frame.depth)?
+        };
         let mut trace_ms = ms(start);
 
         let start = Instant::now();
-        let opaque_background = !matches!(inputs.scene.background, Background::Transparent);
         if opaque_background {
             clear_background(&mut frame, &first_depth);
         }
@@ -105,11 +114,12 @@ impl WindowImage {
                     height: image.height,
                     points: Some(Arc::clone(&image.points)),
                     shading_points: Some(Arc::clone(&image.centres)),
-                    ..options
+                    ..options.clone()
                 };
                 let mut samples = Traced::new(renderer, inputs, &options, mixed)?;
                 if opaque_background {
-                    clear_background(&mut samples.frame, &samples.first_depth);
+                    let first_depth = first_surface_depth(renderer, inputs, &options)?;
+                    clear_background(&mut samples.frame, &first_depth);
                 }
                 if !inputs.edges.is_empty() {
                     // As in OpenGL, a pixel's samples have the lines of its centre.
@@ -131,6 +141,7 @@ impl WindowImage {
 
         let start = Instant::now();
         (self.width, self.height) = (view.width, view.height);
+        self.straight.clear();
         std::mem::swap(&mut self.depth, &mut frame.depth);
         if blend {
             self.opaque.clear();
@@ -143,14 +154,23 @@ impl WindowImage {
             } else {
                 std::mem::swap(&mut self.blended, &mut frame.color);
             }
+            let pixels = self.blended.par_iter().with_min_len(CHUNK).zip(&self.depth);
+            if view.one_layer && pixels.clone().all(|(c, depth)| has_straight(*c, *depth)) {
+                pixels.map(|(c, depth)| straight(*c, *depth)).collect_into_vec(&mut self.straight);
+            } else if one_layer {
+                first_depth = self::first_depth(renderer, inputs, &options, view, &self.depth)?;
+            }
             if !inputs.edges.is_empty() {
                 first_depth
                     .iter_mut()
                     .zip(&self.depth)
                     .for_each(|(first, own)| *first = first.min(*own));
             }
-            self.first_depth =
-                if first_depth.is_empty() { self.depth.clone() } else { first_depth };
+            self.first_depth = if first_depth.is_empty() && self.straight.is_empty() {
+                self.depth.clone()
+            } else {
+                first_depth
+            };
         } else {
             self.blended.clear();
             self.first_depth.clear();
@@ -171,13 +191,29 @@ impl WindowImage {
     }
 }
 
+/// Whether no part of a colour is greater than its opacity by more than rounding.
+fn has_straight([r, g, b, a]: [f32; 4], depth: f32) -> bool {
+    depth < 1.0 || r.max(g).max(b) <= a + 1.0 / 512.0
+}
+
+/// See [`WindowImage::straight`].
+fn straight([r, g, b, a]: [f32; 4], depth: f32) -> [u16; 4] {
+    // Two bytes, since a product of two roundings to one byte is off by more than one level.
+    let number = |v: f32| (v.clamp(0.0, 1.0) * 65535.0 + 0.5) as u16;
+    if depth < 1.0 {
+        [r, g, b, 1.0].map(number)
+    } else if a > 0.0 {
+        [r / a, g / a, b / a, a].map(number)
+    } else {
+        [0; 4]
+    }
+}
+
 /// What one image of rays gives, encoded for the window.
 struct Traced {
     frame: Frame,
     /// See [`RenderInputs::lines`]; empty without.
     lit_lines: Vec<[f32; 4]>,
-    /// Depth of the first surface where that may not be the frame's; else empty.
-    first_depth: Vec<f32>,
     rays: RayStats,
     warnings: Vec<String>,
 }
@@ -191,7 +227,6 @@ impl Traced {
     ) -> Result<Traced, BridgeError> {
         let output = renderer.render(inputs.scene, inputs.camera, options)?;
         let mut frame = output.frame;
-        let opaque_background = !matches!(inputs.scene.background, Background::Transparent);
         let mut lit_lines = match inputs.lines {
             Some(lines) => {
                 let wanted = if mixed { Layers::COLOR | Layers::IDS } else { Layers::COLOR };
@@ -200,28 +235,55 @@ impl Traced {
             }
             None => Frame::default(),
         };
-        let effects = inputs.options.effects.unwrap_or(Effects::NONE);
-        let first_depth = if effects.contains(Effects::TRANSPARENCY) || opaque_background {
-            let depth_only = RenderOptions {
-                layers: Layers::DEPTH,
-                samples: 1,
-                depth_min_opacity: inputs.options.depth_min_opacity,
-                ..options.clone()
-            };
-            renderer.render(inputs.scene, inputs.camera, &depth_only)?.frame.depth
-        } else {
-            Vec::new()
-        };
         encode(&mut frame, inputs.encodings, mixed);
         encode(&mut lit_lines, inputs.encodings, mixed);
         Ok(Traced {
             frame,
             lit_lines: lit_lines.color,
-            first_depth,
             rays: output.report.rays,
             warnings: output.report.warnings,
         })
     }
+}
+
+/// Depth of the first thing in each pixel, opaque or not, where that may not be the frame's `depth`;
+/// else empty. Volumes are at their middle.
+fn first_depth(
+    renderer: &mut Renderer,
+    inputs: &RenderInputs<'_>,
+    options: &RenderOptions,
+    view: &View,
+    depth: &[f32],
+) -> Result<Vec<f32>, BridgeError> {
+    let effects = inputs.options.effects.unwrap_or(Effects::NONE);
+    let opaque_background = !matches!(inputs.scene.background, Background::Transparent);
+    let mut first = if effects.contains(Effects::TRANSPARENCY) || opaque_background {
+        first_surface_depth(renderer, inputs, options)?
+    } else {
+        Vec::new()
+    };
+    if effects.contains(Effects::VOLUMES) {
+        if first.is_empty() {
+            first.extend_from_slice(depth);
+        }
+        crate::volumes::place_in_depth(&inputs.scene.volumes, view, &mut first);
+    }
+    Ok(first)
+}
+
+/// Depth of the first surface in each pixel, opaque or not, 1 where there is none.
+fn first_surface_depth(
+    renderer: &mut Renderer,
+    inputs: &RenderInputs<'_>,
+    options: &RenderOptions,
+) -> Result<Vec<f32>, BridgeError> {
+    let depth_only = RenderOptions {
+        layers: Layers::DEPTH,
+        samples: 1,
+        depth_min_opacity: inputs.options.depth_min_opacity,
+        ..options.clone()
+    };
+    Ok(renderer.render(inputs.scene, inputs.camera, &depth_only)?.frame.depth)
 }
 
 /// Removes the background that reflections and refractions needed: pixels without a hit belong to
@@ -254,5 +316,21 @@ fn encode(frame: &mut Frame, encodings: &[Encoding], mixed: bool) {
         });
     } else if let Some(encoding) = encodings.first().filter(|e| **e != Encoding::Direct) {
         colors.for_each(|c| encoded(c, *encoding));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{has_straight, straight};
+
+    #[test]
+    fn one_layer_is_opaque_where_a_surface_is_and_straight_elsewhere() {
+        assert_eq!(straight([0.5, 0.25, 0.0, 0.9], 0.3), [32768, 16384, 0, 65535]);
+        assert_eq!(straight([0.25, 0.125, 0.0, 0.5], 1.0), [32768, 16384, 0, 32768]);
+        assert_eq!(straight([0.0; 4], 1.0), [0; 4]);
+        // A highlight in front of nothing has more colour than opacity.
+        assert!(!has_straight([0.5, 0.0, 0.0, 0.25], 1.0));
+        assert!(has_straight([0.5, 0.0, 0.0, 0.25], 0.3) && has_straight([0.0; 4], 1.0));
+        assert_eq!(straight([f32::NAN, 0.0, 0.0, 1.0], 0.0)[0], 0);
     }
 }

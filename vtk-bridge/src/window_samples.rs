@@ -327,6 +327,7 @@ mod tests {
             shadows: false,
             samples: 0,
             window_samples,
+            one_layer: false,
             lens: None,
         };
         let image = bridge.render(&view).expect("an image");

@@ -9,6 +9,7 @@ use std::path::Path;
 fn c_type(rust: &str) -> String {
     let simple = match rust.trim() {
         "u8" => "uint8_t",
+        "u16" => "uint16_t",
         "u32" => "uint32_t",
         "u64" => "uint64_t",
         "i32" => "int32_t",

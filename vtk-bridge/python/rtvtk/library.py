@@ -4,7 +4,7 @@ import os
 
 import numpy as np
 
-ABI = 3248043196
+ABI = 1760331924
 #: The first VTK whose renderers Python can replace.
 OLDEST_VTK = (9, 4)
 NONE, U8, F32, F64, I32, I64 = range(6)
@@ -84,14 +84,14 @@ class View(C.Structure):
     _fields_ = [
         ("clip_from_world", C.c_double * 16), ("background_bottom", C.c_float * 3), ("background_top", C.c_float * 3),
         ("focus_distance", C.c_double), ("width", C.c_uint32), ("height", C.c_uint32), ("interactive", C.c_uint32), ("shadows", C.c_uint32),
-        ("window_samples", C.c_uint32), ("reserved", C.c_uint32),
+        ("window_samples", C.c_uint32), ("one_layer", C.c_uint32),
     ]
 
 
 class Picture(C.Structure):
     _fields_ = [
         ("width", C.c_uint32), ("height", C.c_uint32), ("opaque", C.POINTER(C.c_uint8)), ("blended", C.POINTER(C.c_float)),
-        ("depth", C.POINTER(C.c_float)), ("first_depth", C.POINTER(C.c_float)),
+        ("depth", C.POINTER(C.c_float)), ("first_depth", C.POINTER(C.c_float)), ("straight", C.POINTER(C.c_uint16)),
     ]
 
 

@@ -17,7 +17,8 @@ def _depth(name, texture):
 
 # Common start of all rectangles' shaders; texel centres coincide with pixel centres.
 _FETCH = "vec2 uv = tcoordVCVSOutput; vec4 c = texture(rtvColor, uv); if (c.a <= 0.0) discard; " + _depth("d", "rtvDepth")
-_OPAQUE = _FETCH + "gl_FragData[0] = c; gl_FragDepth = d;"
+# Colour and depth as they are.
+_WHOLE = _FETCH + "gl_FragData[0] = c; gl_FragDepth = d;"
 # Pixels with an opaque surface; their colour already includes everything in front of it.
 _COVERED = _FETCH + "if (d >= 1.0) discard; gl_FragData[0] = vec4(c.rgb, 1.0); gl_FragDepth = d;"
 # Pixels with translucent surfaces only; VTK blends them with colours that are not premultiplied.
@@ -91,10 +92,10 @@ class Overlay:
     def __init__(self):
         self._layers = {}
 
-    def _layer(self, shader, names, translucent=False):
-        if shader not in self._layers:
-            self._layers[shader] = _Layer(shader, names, translucent)
-        return self._layers[shader]
+    def _layer(self, name, shader, planes, translucent=False):
+        if name not in self._layers:
+            self._layers[name] = _Layer(shader, planes, translucent)
+        return self._layers[name]
 
     def actors(self, picture, camera):
         """The rectangles that show an image of the library."""
@@ -107,11 +108,17 @@ class Overlay:
 
         if picture.opaque:
             opaque = np.ctypeslib.as_array(picture.opaque, shape)
-            shown = [self._layer(_OPAQUE, ["rtvColor", "rtvDepth"])]
+            shown = [self._layer("opaque", _WHOLE, ["rtvColor", "rtvDepth"])]
             shown[0].upload(rtvColor=opaque, rtvDepth=plane(picture.depth, 4))
+        elif picture.straight:
+            # OpenGL blends opaque props too, by their alpha. As one of them, the rectangle comes last and needs no pass of translucent props.
+            straight = np.ctypeslib.as_array(picture.straight, shape)
+            shown = [self._layer("straight", _WHOLE, ["rtvColor", "rtvDepth"])]
+            shown[0].upload(rtvColor=straight, rtvDepth=plane(picture.depth, 4))
         else:
             color, depth = plane(picture.blended, 16), plane(picture.depth, 4)
-            covered, through = self._layer(_COVERED, ["rtvColor", "rtvDepth"]), self._layer(_THROUGH, ["rtvColor", "rtvDepth", "rtvFirst"], True)
+            covered = self._layer("covered", _COVERED, ["rtvColor", "rtvDepth"])
+            through = self._layer("through", _THROUGH, ["rtvColor", "rtvDepth", "rtvFirst"], True)
             covered.upload(rtvColor=color, rtvDepth=depth)
             through.upload(rtvColor=color, rtvDepth=depth, rtvFirst=plane(picture.first_depth, 4))
             shown = [covered, through]

@@ -130,6 +130,7 @@ class _Tracer:
             if renderer.GetUseSSAO():
                 self.bridge.warn("SSAO does not see what is ray traced; use RTV_AO for ambient occlusion")
             view = view_of(renderer, width, height)
+            view.one_layer = render_pass is None and all(p.IsA("vtkActor2D") for p in visible if p not in traced)
             drawn = bool(self.bridge.render(C.byref(view), C.byref(picture)))
         self.extractor.end_frame(bool(traced))
         if drawn:

@@ -33,7 +33,7 @@ pub struct RtvBridge {
 
 /// Version of this interface, computed from its structures and calls (a test gives the value). A
 /// shim built for another version must not continue.
-pub const RTV_ABI: u32 = 3_248_043_196;
+pub const RTV_ABI: u32 = 1_760_331_924;
 
 /// [`RTV_ABI`] of the library.
 #[unsafe(no_mangle)]
@@ -396,6 +396,7 @@ pub unsafe extern "C" fn rtv_render(
         shadows: v.shadows != 0,
         samples: 0,
         window_samples: v.window_samples,
+        one_layer: v.one_layer != 0,
         lens: Some(crate::input::Lens { aperture_radius: 0.0, focus_distance: v.focus_distance }),
     };
     // SAFETY: as above; `picture` is not null.

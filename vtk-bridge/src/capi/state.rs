@@ -301,6 +301,11 @@ impl BridgeState {
                     blended: pointer(p.blended.as_flattened()),
                     depth: pointer(&p.depth),
                     first_depth: pointer(&p.first_depth),
+                    straight: if p.straight.is_empty() {
+                        std::ptr::null()
+                    } else {
+                        p.straight.as_ptr().cast()
+                    },
                 });
             }
             Err(e) => e,

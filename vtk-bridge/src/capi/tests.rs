@@ -95,7 +95,7 @@ fn view() -> RtvView {
         interactive: 0,
         shadows: 0,
         window_samples: 0,
-        reserved: 0,
+        one_layer: 0,
     }
 }
 
@@ -106,6 +106,7 @@ const NO_PICTURE: RtvPicture = RtvPicture {
     blended: ptr::null(),
     depth: ptr::null(),
     first_depth: ptr::null(),
+    straight: ptr::null(),
 };
 
 const POINTS: [[f32; 3]; 3] = [[-3.0, -1.0, 0.0], [3.0, -1.0, 0.0], [0.0, 3.0, 0.0]];

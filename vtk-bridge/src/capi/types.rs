@@ -331,8 +331,8 @@ pub struct RtvView {
     /// Samples of each pixel of the framebuffer that the image is drawn into; 0 or 1 for none. With
     /// more, the alpha of opaque images is the part of the pixel that is covered.
     pub window_samples: u32,
-    /// Not used.
-    pub reserved: u32,
+    /// 1 when OpenGL draws nothing beside the image that is translucent or has a depth.
+    pub one_layer: u32,
 }
 
 /// An image; rows start at the top, and the memory belongs to the bridge until its next call.
@@ -349,6 +349,9 @@ pub struct RtvPicture {
     pub blended: *const f32,
     /// Window depth of the first opaque surface.
     pub depth: *const f32,
-    /// Window depth of the first surface, or null without `blended`.
+    /// Window depth of the first surface, or null without `blended` or with `straight`.
     pub first_depth: *const f32,
+    /// `blended` as one layer, to be blended over everything with `depth`: RGBA, not premultiplied,
+    /// 65535 for 1; null without `one_layer` or `blended`.
+    pub straight: *const u16,
 }

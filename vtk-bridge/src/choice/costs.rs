@@ -41,36 +41,33 @@ struct SampleCosts {
 
 // The constants of volumes come from `vtk-bridge/python/measure_volumes.py`, whole frames of the
 // wheel's VTK 9.7 with EGL and llvmpipe, and of rtvtk with the library of the development profile,
-// in turns, once each, on an EPYC with AVX-512 that others used too. A nearly empty frame (--zoom
+// three rounds in turns on an EPYC with AVX-512 (load 0.8 to 1.7). A nearly empty frame (--zoom
 // 0.05) gives what a pixel costs; then, at a distance of samples of one point:
 //
 //     points, pixels   what is seen      stock, ms   rtvtk, ms   samples, M   seen, M
-//     65^3, 512^2      nearly nothing    1.2         57          0            0
-//     65^3, 512^2      all               111         156         5.45         5.45
-//     65^3, 512^2      all, shaded       342         303         5.45         5.45
-//     65^3, 512^2      half              123         124         5.45         1.99
-//     65^3, 512^2      half, shaded      327         189         5.45         1.99
-//     65^3, 512^2      dense core        96          107         4.48         0.50
-//     129^3, 512^2     all               237         217         10.85        10.85
-//     129^3, 512^2     all, shaded       727         629         10.85        10.85
-//     257^3, 256^2     all               226         176         5.40         5.40
-//     257^3, 256^2     all, shaded       602         454         5.40         5.40
-//     257^3, 256^2     half              216         139         5.40         1.98
+//     65^3, 512^2      nearly nothing    0.8         25          0            0
+//     65^3, 512^2      all               106         92          5.45         5.45
+//     65^3, 512^2      all, shaded       331         255         5.45         5.45
+//     65^3, 512^2      half              112         87          5.45         1.99
+//     65^3, 512^2      half, shaded      324         149         5.45         1.99
+//     65^3, 512^2      dense core        90          61          4.48         0.50
+//     129^3, 512^2     all               227         172         10.85        10.85
+//     129^3, 512^2     all, shaded       709         525         10.85        10.85
+//     257^3, 256^2     all               186         161         5.40         5.40
+//     257^3, 256^2     all, shaded       498         361         5.40         5.40
+//     257^3, 256^2     half              180         101         5.40         1.98
+//     257^3, 256^2     half, shaded      483         205         5.40         1.98
 
 /// Points of the largest grid that lies in the caches, and of one that does not.
 const POINTS: [f64; 2] = [129.0 * 129.0 * 129.0, 257.0 * 257.0 * 257.0];
-const OPENGL_SAMPLE: SampleCosts = SampleCosts {
-    any: [20.0, 39.0],
-    seen: [0.0, 3.0],
-    light: [42.0, 70.0],
-    light_of_seen: [0.0; 2],
-};
+const OPENGL_SAMPLE: SampleCosts =
+    SampleCosts { any: [20.0, 34.0], seen: [0.0; 2], light: [40.0, 57.0], light_of_seen: [0.0; 2] };
 /// With AVX-512.
 const RAYS_SAMPLE: SampleCosts = SampleCosts {
-    any: [9.1, 19.0],
-    seen: [9.1, 11.0],
+    any: [9.1, 13.0],
+    seen: [3.3, 13.0],
     light: [0.0; 2],
-    light_of_seen: [27.0, 51.0],
+    light_of_seen: [30.0, 45.0],
 };
 /// How many times as long rays take with other instructions: for samples, and for their light.
 #[derive(Debug, Clone, Copy)]
@@ -89,8 +86,8 @@ const AVX2: Slower = Slower { samples: 1.4, light: 2.5 };
 /// Against OpenGL's, which is slower too: with SSE2 the loops alone were measured, at 0.85 to 1.2
 /// times the speed of OpenGL's where AVX-512 has 1.2 to 2.5.
 const SSE: Slower = Slower { samples: 2.0, light: 2.0 };
-/// Milliseconds of a frame of rays with a volume for a million pixels: it has layers to blend.
-const LAYERS: f64 = 216.0;
+/// Milliseconds of a frame of rays with a volume for a million pixels, beside its samples.
+const LAYER: f64 = 95.0;
 /// Milliseconds of OpenGL's frame of volumes alone for a million pixels, beside their samples.
 const EMPTY: f64 = 4.5;
 /// Nanoseconds for a point of a volume, when rays first draw it.
@@ -134,8 +131,12 @@ impl PartCosts {
             + mega * if edges { 500.0 } else { 300.0 }
             + 0.04 * props
             + if veils { 20.0 * megapixels } else { 0.0 };
+        // What OpenGL draws among translucent surfaces, or what has lines to hide, needs the depth of
+        // the first of them, which is another ray, and two rectangles.
+        let apart = f.others > 0 || f.unknown_volumes > 0;
         let pixel = match (veils, edges) {
-            (true, _) => 240.0,
+            (true, _) if edges || apart => 240.0,
+            (true, _) => 125.0,
             (_, true) => 150.0,
             _ if alone => 0.0,
             _ => 75.0,
@@ -144,10 +145,10 @@ impl PartCosts {
         PartCosts { opengl, rays, build: 400.0 * mega + 2.0 }
     }
 
-    /// What blending adds to a frame of rays with volumes.
-    fn of_layers(f: &SceneFacts) -> f64 {
+    /// What a layer that is blended adds to a frame of rays with volumes.
+    fn of_layer(f: &SceneFacts) -> f64 {
         let blended = f.volumes > f.unknown_volumes && f.translucent == 0;
-        if blended { LAYERS * 1e-6 * f.pixels as f64 } else { 0.0 }
+        if blended { LAYER * 1e-6 * f.pixels as f64 } else { 0.0 }
     }
 }
 
@@ -173,7 +174,7 @@ impl Costs {
         let together =
             f.volumes == 0 || f.translucent > 0 || f.unknown_volumes == 0 && f.others == 0;
         let surfaces = [rest.rays + media.opengl, rest.build];
-        let all = [rest.rays + PartCosts::of_layers(f) + media.rays, rest.build + media.build];
+        let all = [rest.rays + PartCosts::of_layer(f) + media.rays, rest.build + media.build];
         Costs {
             opengl: rest.opengl + media.opengl,
             surfaces: if apart { surfaces } else { NEVER },
