@@ -61,6 +61,70 @@ def spheres(vtk, _):
     return actors
 
 
+def volume(vtk, name):
+    """A smooth field of which about half is clear, on the cube of points that the name says."""
+    import numpy as np
+    from vtkmodules.util.numpy_support import numpy_to_vtk
+
+    points = int(name.split()[1])
+    x = np.linspace(-1, 1, points, dtype=np.float32)
+    bell = np.exp(-x * x)
+    values = 0.24 + 0.52 * bell[None, None, :] * bell[None, :, None] * bell[:, None, None]
+    values += 0.08 * (np.sin(9 * x)[None, None, :] + np.cos(13 * x)[:, None, None])
+    values += 0.08 * np.sin(11 * x)[None, :, None]
+    image = vtk.vtkImageData()
+    image.SetDimensions(points, points, points)
+    image.SetSpacing(*([1 / (points - 1)] * 3))
+    image.GetPointData().SetScalars(numpy_to_vtk(values.astype(np.float32).ravel(), deep=True))
+    colors = vtk.vtkColorTransferFunction()
+    for value, *rgb in ((0, 0.1, 0.2, 0.9), (0.5, 0.9, 0.9, 0.7), (1, 0.9, 0.1, 0.1)):
+        colors.AddRGBPoint(value, *rgb)
+    opacity = vtk.vtkPiecewiseFunction()
+    for value, of in ((0, 0), (0.5, 0), (1, 0.05)):
+        opacity.AddPoint(value, of)
+    mapper = vtk.vtkGPUVolumeRayCastMapper()
+    mapper.SetInputData(image)
+    # A sample a spacing, which the smart mapper takes too.
+    mapper.SetAutoAdjustSampleDistances(False)
+    mapper.SetLockSampleDistanceToInputSpacing(False)
+    mapper.SetSampleDistance(1 / (points - 1))
+    actor = vtk.vtkVolume()
+    actor.SetMapper(mapper)
+    look = actor.GetProperty()
+    look.SetColor(colors)
+    look.SetScalarOpacity(opacity)
+    look.SetScalarOpacityUnitDistance(1 / 64)
+    look.SetInterpolationTypeToLinear()
+    look.SetShade("shaded" in name)
+    return [actor]
+
+
+def ellipsoid(vtk, _):
+    """One translucent surface of 20,000 triangles: two layers."""
+    shape = vtk.vtkParametricEllipsoid()
+    shape.SetYRadius(0.6)
+    shape.SetZRadius(0.5)
+    source = vtk.vtkParametricFunctionSource()
+    source.SetParametricFunction(shape)
+    source.SetUResolution(100)
+    source.SetVResolution(100)
+    mapper = vtk.vtkPolyDataMapper()
+    mapper.SetInputConnection(source.GetOutputPort())
+    actor = vtk.vtkActor()
+    actor.SetMapper(mapper)
+    actor.GetProperty().SetOpacity(0.4)
+    return [actor]
+
+
+#: What makes a scene, by the first word of its name.
+MAKERS = {
+    "500": spheres,
+    "isosurfaces": isosurfaces,
+    "translucent": ellipsoid,
+    "volume": volume,
+}
+
+
 def main():
     order = json.loads(sys.argv[1])
     if order["tracer"] != "stock":
@@ -68,10 +132,10 @@ def main():
         import rtvtk  # noqa: F401
     import vtk
 
-    make = spheres if order["scene"] == "500 spheres" else isosurfaces
+    make = MAKERS[order["scene"].split()[0]]
     renderer = vtk.vtkRenderer()
-    for actor in make(vtk, order["scene"]):
-        renderer.AddActor(actor)
+    for prop in make(vtk, order["scene"]):
+        renderer.AddViewProp(prop)
     window = vtk.vtkRenderWindow()
     window.SetOffScreenRendering(1)
     window.SetMultiSamples(0)

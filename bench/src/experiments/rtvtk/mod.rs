@@ -1,5 +1,5 @@
-//! Frames of VTK's wheel as it is against the same with rtvtk: large isosurfaces, and many small
-//! actors. Each measurement is a process of its own, and the processes take turns.
+//! Frames of VTK's wheel as it is against the same with rtvtk: large isosurfaces, many small actors,
+//! a translucent surface, and volumes. Each measurement is a process of its own, and the processes take turns.
 
 use super::Context;
 use super::python_process;
@@ -18,6 +18,7 @@ const TRACERS: [&str; 3] = ["stock", "rtvtk", "rtvtk, always"];
 const WARM: usize = 5;
 
 /// A scene, and the width of its square image.
+#[derive(Clone, Copy)]
 struct Subject {
     scene: &'static str,
     pixels: u32,
@@ -63,10 +64,14 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     };
     let subject = |scene, pixels| Subject { scene, pixels };
     let (subjects, rounds) = if context.quick {
-        (vec![subject("isosurfaces small", 256), subject("500 spheres", 300)], 1)
+        let small = ["isosurfaces small", "500 spheres", "translucent", "volume 33"];
+        (small.map(|scene| subject(scene, 300)).to_vec(), 1)
     } else {
-        let large = ["isosurfaces 1 M", "isosurfaces 4 M"].map(|scene| subject(scene, 1024));
-        (large.into_iter().chain([subject("500 spheres", 300)]).collect(), VERDICT_ROUNDS)
+        let large = ["isosurfaces 1 M", "isosurfaces 4 M", "translucent"];
+        let volumes = ["volume 65", "volume 65 shaded", "volume 257", "volume 257 shaded"];
+        let all = large.map(|scene| subject(scene, 1024)).into_iter();
+        let all = all.chain([subject("500 spheres", 300)]);
+        (all.chain(volumes.map(|scene| subject(scene, 512))).collect(), VERDICT_ROUNDS)
     };
     record.notes.push(format!(
         "One sample a pixel, no effects. The camera turns by 15 degrees a frame; the first frame \
@@ -80,7 +85,12 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
 }
 
 fn columns(record: &mut Record) {
-    record.column("scene", "", "isosurfaces in one actor; 500 actors of 96 triangles");
+    record.column(
+        "scene",
+        "",
+        "isosurfaces in one actor; 500 actors of 96 triangles; a translucent ellipsoid; volumes, \
+         by their points along an axis",
+    );
     record.column("triangles", "", "triangles of the scene");
     record.column("pixels", "", "width and height of the image");
     record.column("tracer", "", "VTK’s wheel alone; with rtvtk; with rtvtk, all frames traced");
