@@ -246,8 +246,8 @@ impl Traced {
     }
 }
 
-/// Depth of the first thing in each pixel, opaque or not, where that may not be the frame's `depth`;
-/// else empty. Volumes are at their middle.
+/// Depth of the first thing in each pixel, opaque or not, where that may not be the frame's
+/// `depth`; else empty. Volumes are at their middle.
 fn first_depth(
     renderer: &mut Renderer,
     inputs: &RenderInputs<'_>,

@@ -131,7 +131,7 @@ impl PartCosts {
             + mega * if edges { 500.0 } else { 300.0 }
             + 0.04 * props
             + if veils { 20.0 * megapixels } else { 0.0 };
-        // What OpenGL draws among translucent surfaces, or what has lines to hide, needs the depth of
+        // What OpenGL draws among translucent surfaces, and lines that they hide, need the depth of
         // the first of them, which is another ray, and two rectangles.
         let apart = f.others > 0 || f.unknown_volumes > 0;
         let pixel = match (veils, edges) {

@@ -1,5 +1,6 @@
-//! Frames of VTK's wheel as it is against the same with rtvtk: large isosurfaces, many small actors,
-//! a translucent surface, and volumes. Each measurement is a process of its own, and the processes take turns.
+//! Frames of VTK's wheel as it is against the same with rtvtk: large isosurfaces, many small
+//! actors, a translucent surface, and volumes. Each measurement is a process of its own, and the
+//! processes take turns.
 
 use super::Context;
 use super::python_process;
