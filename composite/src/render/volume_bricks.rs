@@ -354,7 +354,9 @@ fn covered_by(scene: &Scene, finer: &[usize], volume: usize) -> impl Fn(UVec3) -
         .iter()
         .zip(finer)
         .filter(|(placed, finer_than_it)| {
-            placed.volume.is_medium() && **finer_than_it < finer[volume]
+            let options = placed.volume.options();
+            let is_whole = options.clip_planes.is_empty() && options.cropping.is_none();
+            placed.volume.is_medium() && is_whole && **finer_than_it < finer[volume]
         })
         .map(|(placed, _)| (placed, world_from_object(placed).inverse() * world_from_object(here)))
         .collect();

@@ -28,6 +28,7 @@ mod options;
 mod projection;
 mod ray_segments;
 mod reference;
+mod region;
 mod sample_gradient;
 mod sample_light;
 mod sample_medium;
@@ -45,6 +46,7 @@ pub use options::{
 };
 pub use ray_segments::{RaySegments, composite_projections, integrate_overlapping};
 pub use reference::integrate_reference;
+pub use region::{ClipPlane, Cropping};
 
 use crate::grid::Grid;
 use crate::grid_walk::{Crossing, IndexRay};
@@ -60,6 +62,7 @@ use glam::{DVec3, UVec3};
 use layer::{Layer, MarchState};
 use linear_segment::RayInLanes;
 use rayon::prelude::*;
+use region::in_box;
 use samples::Samples;
 use std::sync::Arc;
 use stored::StoredBlocks;
@@ -248,8 +251,22 @@ impl Volume {
     /// Sets [`VolumeOptions::viewer`], which costs no look at the grid. A stored volume is read
     /// again.
     pub fn set_viewer(&mut self, viewer: Option<DVec3>) -> Result<(), VolumeError> {
-        let options = VolumeOptions { viewer, ..self.options.clone() };
-        options.check((self.grid.spacing * (self.dims - UVec3::ONE).as_dvec3()).length())?;
+        self.set_options(VolumeOptions { viewer, ..self.options.clone() })
+    }
+
+    /// Sets [`VolumeOptions::clip_planes`] and [`VolumeOptions::cropping`], which costs no look at
+    /// the grid. A stored volume is read again.
+    pub fn set_clipping(
+        &mut self,
+        clip_planes: Vec<ClipPlane>,
+        cropping: Option<Cropping>,
+    ) -> Result<(), VolumeError> {
+        self.set_options(VolumeOptions { clip_planes, cropping, ..self.options.clone() })
+    }
+
+    /// Takes options that find the same blocks empty.
+    fn set_options(&mut self, options: VolumeOptions) -> Result<(), VolumeError> {
+        options.check(self.size().length())?;
         self.options = options;
         self.forget_parts();
         Ok(())
@@ -283,10 +300,23 @@ impl Volume {
         GridExtent { dims: self.dims, origin: self.origin, spacing: self.grid.spacing }
     }
 
-    /// Bounds of the whole volume relative to [`Volume::origin`].
+    /// Bounds of what is drawn of the whole volume, relative to [`Volume::origin`]. Clip planes and
+    /// cropping do not make them smaller.
     pub fn bounds(&self) -> Aabb {
-        let max_corner = self.origin + self.grid.spacing * (self.dims - UVec3::ONE).as_dvec3();
-        outward_box(DVec3::ZERO, max_corner - self.origin)
+        let [low, high] = self.drawn_box();
+        outward_box(low, high)
+    }
+
+    /// The box at which rays enter the volume.
+    fn drawn_box(&self) -> [DVec3; 2] {
+        let size = self.size();
+        let corners = self.options.bounds.unwrap_or([DVec3::ZERO, size]);
+        corners.map(|c| c.clamp(DVec3::ZERO, size))
+    }
+
+    /// From the first to the last point of the whole volume.
+    fn size(&self) -> DVec3 {
+        self.grid.spacing * (self.dims - UVec3::ONE).as_dvec3()
     }
 
     /// The grid; for a part, the points that it holds; for a stored volume, one.
@@ -323,8 +353,14 @@ impl Volume {
         if self.takes_samples() {
             return self.sample_ray(ray, t0 as f32, t1 as f32);
         }
-        PartialIntegral::from(self.march(ray, t0, t1, quality, &PartialIntegral::default()))
-            .sample()
+        let mut collected = PartialIntegral::default();
+        let (o, d) = (ray.origin.as_dvec3(), ray.dir.as_dvec3());
+        for [t0, t1] in self.options.cropped(o, d, [t0, t1]).as_slice() {
+            if !collected.is_opaque(quality) {
+                collected = self.march(ray, *t0, *t1, quality, &collected).into();
+            }
+        }
+        collected.sample()
     }
 
     /// Whether cells are boxes around the points of the grid instead of between them.
@@ -341,17 +377,18 @@ impl Volume {
         if self.is_nearest() { self.dims } else { self.dims - UVec3::ONE }
     }
 
-    /// The ray in cell indices, the number of cells, and the part of `t0..t1` inside the bounds.
+    /// The ray in cell indices, the number of cells, and the part of `t0..t1` inside the bounds and
+    /// the clip planes.
     fn index_ray(&self, ray: &Ray, t0: f64, t1: f64) -> (IndexRay, UVec3, f64, f64) {
         let (o, d, spacing) = (ray.origin.as_dvec3(), ray.dir.as_dvec3(), self.grid.spacing);
+        let [t0, t1] = self.options.clipped(o, d, t0, t1);
         if !self.is_nearest() {
             return (IndexRay::new(o, d, spacing), self.cells(), t0, t1);
         }
         // Cells are boxes around points: they extend half a spacing past the bounds, where they are
         // clipped.
-        let max_corner = self.origin + spacing * (self.dims - UVec3::ONE).as_dvec3();
-        let (near, far) = within(o, d, max_corner - self.origin);
-        (IndexRay::new(o + 0.5 * spacing, d, spacing), self.cells(), t0.max(near), t1.min(far))
+        let [t0, t1] = in_box(o, d, [DVec3::ZERO, self.size()], t0, t1);
+        (IndexRay::new(o + 0.5 * spacing, d, spacing), self.cells(), t0, t1)
     }
 
     /// [`Volume::integrate`] of a medium, in f64, behind what was collected `before`.
@@ -534,22 +571,6 @@ impl Volume {
         let (lo, hi) = ray_cubic::hull(b);
         self.transfer.is_clear(lo, hi)
     }
-}
-
-/// The interval in which a ray is inside the box from zero to `size`.
-fn within(o: DVec3, d: DVec3, size: DVec3) -> (f64, f64) {
-    let (mut near, mut far) = (f64::NEG_INFINITY, f64::INFINITY);
-    for a in 0..3 {
-        if d[a] == 0.0 {
-            if o[a] < 0.0 || o[a] > size[a] {
-                return (f64::INFINITY, f64::NEG_INFINITY);
-            }
-        } else {
-            let (x, y) = (-o[a] / d[a], (size[a] - o[a]) / d[a]);
-            (near, far) = (near.max(x.min(y)), far.min(x.max(y)));
-        }
-    }
-    (near, far)
 }
 
 /// Range of the finite values of a block's cells, and how many cells have a value that is not

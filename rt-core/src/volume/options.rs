@@ -1,5 +1,6 @@
 //! Appearance of a volume: shading, blending, and the checks of both.
 
+use super::region::{ClipPlane, Cropping};
 use crate::grid::GridError;
 use glam::{DVec3, UVec3, Vec3};
 use std::sync::Arc;
@@ -46,6 +47,14 @@ pub enum VolumeError {
          stays in its file; leave the distance out, and rays are integrated to the tolerance"
     )]
     StoredSamples,
+    /// An invalid part of the volume to draw.
+    #[error("volume: {field} must be {rule}")]
+    Region {
+        /// The option.
+        field: &'static str,
+        /// What is allowed.
+        rule: &'static str,
+    },
 }
 
 /// Samples along the diagonal of a grid: their numbers are whole in f32 up to four times as many.
@@ -203,6 +212,14 @@ pub struct VolumeOptions {
     /// VTK's GPU mapper does so in parallel projections too, where that is not the ray. `None` goes
     /// by the ray.
     pub viewer: Option<DVec3>,
+    /// Lower and upper corner of the box that is drawn, world units from the grid's origin in the
+    /// volume's axes; `None` for the whole grid. Rays enter the volume at this box.
+    pub bounds: Option<[DVec3; 2]>,
+    /// What is drawn lies in all of these half-spaces. Rays enter the volume at the planes.
+    pub clip_planes: Vec<ClipPlane>,
+    /// Samples are left out, or the integral skips, where this does not draw. Rays enter the volume
+    /// where they would without it. Regions other than one box need [`Blend::Composite`].
+    pub cropping: Option<Cropping>,
 }
 
 impl VolumeOptions {
@@ -214,6 +231,7 @@ impl VolumeOptions {
                 return Err(VolumeError::SampleDistance { distance, least });
             }
         }
+        self.check_region()?;
         let fault = |field, value, rule| Err(VolumeError::Shading { field, value, rule });
         if let Some(viewer) = self.viewer.filter(|v| !v.is_finite()) {
             return fault("viewer", viewer.element_sum() as f32, "a finite position");

@@ -144,11 +144,14 @@ impl<'a> RaySegments<'a> {
             let mut blocks = Vec::new();
             if volume.is_medium() && ray.is_valid() && t0 < t1 {
                 let cells = cells.to_array().map(i64::from);
-                index_ray.walk([0; 3], cells, cells, i64::from(MACROCELL), t0, t1, |c| {
-                    let block = UVec3::from_array(c.cell.map(|c| c as u32 / MACROCELL));
-                    blocks.push(BlockSegment { block, t0: c.t0, t1: c.t1 });
-                    true
-                });
+                let (o, d) = (ray.origin.as_dvec3(), ray.dir.as_dvec3());
+                for [t0, t1] in volume.options.cropped(o, d, [t0, t1]).as_slice() {
+                    index_ray.walk([0; 3], cells, cells, i64::from(MACROCELL), *t0, *t1, |c| {
+                        let block = UVec3::from_array(c.cell.map(|c| c as u32 / MACROCELL));
+                        blocks.push(BlockSegment { block, t0: c.t0, t1: c.t1 });
+                        true
+                    });
+                }
             }
             let anchor = blocks.first().map_or(f64::INFINITY, |b| b.t0);
             first = first.min(anchor);

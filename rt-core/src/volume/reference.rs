@@ -83,8 +83,9 @@ pub(super) fn samples_reference(volume: &Volume, ray: &Ray, t1: f64) -> [f64; 4]
     let distance = volume.options().sample_distance.expect("a volume with samples");
     let (o, d) = (ray.origin.as_dvec3(), ray.dir.as_dvec3());
     let last = (grid.dims - UVec3::ONE).as_dvec3();
-    let (near, far) = super::within(o, d, grid.spacing * last);
-    let (near, step) = (near.max(0.0), distance / d.length());
+    let grid_box = [DVec3::ZERO, grid.spacing * last];
+    let [near, far] = super::in_box(o, d, grid_box, 0.0, f64::INFINITY);
+    let step = distance / d.length();
     let (index_ray, ..) = volume.index_ray(ray, near, far);
     let transfer = volume.transfer_function();
     let [low, high] = transfer.range();

@@ -32,6 +32,8 @@ pub(super) struct Packet {
     /// Numbers of the first and the last sample; an unused lane has none.
     pub(super) first: Row,
     pub(super) last: Row,
+    /// The share of the light behind that passes what is in front of the first sample.
+    pub(super) through: Row,
 }
 
 impl Packet {
@@ -41,6 +43,7 @@ impl Packet {
         view: Rows3::ZERO,
         first: [1.0; LANES],
         last: [0.0; LANES],
+        through: [1.0; LANES],
     };
 }
 
@@ -103,9 +106,10 @@ impl Medium<'_> {
         let view = Vec3x16::load(simd, &packet.view);
         let last = f32x16::from_slice(simd, &packet.last);
         let mut number = f32x16::from_slice(simd, &packet.first);
-        let mut active = number.simd_le(last);
+        let mut through = f32x16::from_slice(simd, &packet.through);
+        let mut active = number.simd_le(last) & through.simd_ge(s(OPAQUE_BELOW));
         let mut color = [zero; 3];
-        let (mut through, mut half, mut samples) = (one, zero, zero);
+        let (mut half, mut samples) = (zero, zero);
         let mut until_look = 0;
         while active.any_true() {
             let place = origin.add(step.scale(number));

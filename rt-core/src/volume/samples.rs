@@ -3,17 +3,19 @@
 //! A ray that enters the grid at t₀ has samples at t₀ + k d, k = 1, 2, …: sample k stands for the
 //! slab in front of it, from k − 1 to k, with the opacity of that thickness. A slab belongs to a
 //! part of the ray if it begins in it, so the parts in front of a surface and behind it share no
-//! slab and leave none out. The first slab counts also where it ends outside.
+//! slab and leave none out. A clip plane ends a ray as a surface does. The first slab counts also
+//! where it ends outside.
 
 use super::empty_space::distances;
+use super::region::in_box;
 use super::sample_light::{GradientFactors, PacketLights};
 use super::sample_medium::{Gradients, Medium};
 use super::sample_packet::{Packet, march};
 use super::sample_table::SampleTable;
-use super::{Blend, Volume, VolumeSample, within};
+use super::{Blend, Volume, VolumeSample};
 use crate::ray::{LANES, Ray};
 use crate::simd::gather::GatherSlice;
-use glam::{DVec3, UVec3};
+use glam::DVec3;
 
 /// What is known of a volume before any ray.
 #[derive(Debug, Clone)]
@@ -29,6 +31,23 @@ pub(super) struct Samples {
     unit: f64,
     /// Factors of the gradient opacity, two or more.
     factors: Vec<f32>,
+}
+
+/// Runs of samples that cropping may leave of a ray.
+const MOST_RUNS: usize = 4;
+
+/// The samples of one ray.
+#[derive(Clone, Copy)]
+struct SampledRay {
+    /// Parameter of the entry, and of one step.
+    entry: f64,
+    step: f64,
+    /// Numbers of the first and the last sample of each run; those without samples come last.
+    runs: [[f32; 2]; MOST_RUNS],
+}
+
+impl SampledRay {
+    const NONE: SampledRay = SampledRay { entry: 0.0, step: 0.0, runs: [[1.0, 0.0]; MOST_RUNS] };
 }
 
 impl Samples {
@@ -86,31 +105,40 @@ impl Volume {
     fn sample_packet(&self, rays: &[(Ray, [f32; 2])], out: &mut Vec<VolumeSample>) {
         let clear = out.len();
         out.resize(clear + rays.len(), VolumeSample::CLEAR);
+        let out = &mut out[clear..];
         let Some(samples) = &self.samples else { return };
         let Some(medium) = self.medium(samples) else { return };
         let mut packet = Packet::EMPTY;
-        // Parameter of the entry, and of one step.
-        let mut parameters = [[0.0; 2]; LANES];
-        let mut any = false;
+        let mut lanes = [SampledRay::NONE; LANES];
         for (lane, (ray, span)) in rays.iter().enumerate() {
             if let Some(found) = self.set_lane(samples, &mut packet, lane, ray, *span) {
-                parameters[lane] = found;
-                any = true;
+                lanes[lane] = found;
             }
         }
-        if !any {
-            return;
-        }
-        let found = march(self.level, &medium, &packet);
-        for (lane, out) in out[clear..].iter_mut().enumerate() {
-            let [t0, step] = parameters[lane];
-            let [r, g, b] = found.color.map(|row| row[lane]);
-            let half = f64::from(found.half[lane]);
-            *out = VolumeSample {
-                rgba: [r, g, b, 1.0 - found.transmittance[lane]],
-                depth: if half > 0.0 { (t0 + half * step) as f32 } else { f32::INFINITY },
-                samples: found.samples[lane] as u32,
-            };
+        // One run of samples for each ray, but where cropping leaves several.
+        for run in 0..MOST_RUNS {
+            let mut any = false;
+            for (lane, ray) in lanes.iter().enumerate() {
+                let [first, last] = ray.runs[run];
+                (packet.first[lane], packet.last[lane]) = (first, last);
+                any |= first <= last;
+            }
+            if !any {
+                return;
+            }
+            let found = march(self.level, &medium, &packet);
+            for ((lane, out), ray) in out.iter_mut().enumerate().zip(&lanes) {
+                for (sum, row) in out.rgba.iter_mut().zip(&found.color) {
+                    *sum += row[lane];
+                }
+                out.rgba[3] = 1.0 - found.transmittance[lane];
+                out.samples += found.samples[lane] as u32;
+                let half = f64::from(found.half[lane]);
+                if half > 0.0 {
+                    out.depth = (ray.entry + half * ray.step) as f32;
+                }
+            }
+            packet.through = found.transmittance;
         }
     }
 
@@ -136,8 +164,7 @@ impl Volume {
         Some(medium)
     }
 
-    /// Writes a ray into a lane of the packet. Returns the parameter at which it enters the grid
-    /// and that of a step; `None` for a ray without samples.
+    /// Writes a ray into a lane of the packet, without its samples; `None` for a ray that has none.
     fn set_lane(
         &self,
         samples: &Samples,
@@ -145,24 +172,25 @@ impl Volume {
         lane: usize,
         ray: &Ray,
         span: [f32; 2],
-    ) -> Option<[f64; 2]> {
+    ) -> Option<SampledRay> {
         let (t0, t1) = (f64::from(span[0].max(ray.t_min)), f64::from(span[1].min(ray.t_max)));
         if !(ray.is_valid() && t0 < t1) {
             return None;
         }
         let (o, d) = (ray.origin.as_dvec3(), ray.dir.as_dvec3());
         let spacing = self.grid.spacing;
-        let (near, far) = within(o, d, spacing * (self.dims - UVec3::ONE).as_dvec3());
-        let near = near.max(0.0);
+        let [near, far] = in_box(o, d, [DVec3::ZERO, self.size()], 0.0, f64::INFINITY);
+        let [near, far] = self.options.in_bounds(o, d, near, far);
+        let [near, behind] = self.options.in_front(o, d, near, far);
         let per_t = d.length();
         let step = samples.distance / per_t;
-        if !(near < far && step > 0.0) {
+        if !(near < behind && step > 0.0) {
             return None;
         }
         // Slabs that begin before a parameter.
         let before = |t: f64| ((t - near) / step).ceil();
         let first = before(t0).max(0.0) + 1.0;
-        let last = ((far - near) / step).floor().max(1.0).min(before(t1));
+        let last = ((far - near) / step).floor().max(1.0).min(before(t1)).min(before(behind));
         if !(first <= last && near < t1) {
             return None;
         }
@@ -170,8 +198,19 @@ impl Volume {
         packet.origin.set(lane, at(o + d * near));
         packet.step.set(lane, at(d * step));
         packet.view.set(lane, self.view_along(o, d).normalize_or_zero().as_vec3());
-        (packet.first[lane], packet.last[lane]) = (first as f32, last as f32);
-        Some([near, step])
+        let mut found = SampledRay { entry: near, step, ..SampledRay::NONE };
+        if self.options.cropping.is_none() {
+            found.runs[0] = [first as f32, last as f32];
+            return Some(found);
+        }
+        let cropped = self.options.cropped(o, d, [near, far.min(behind + step)]);
+        for (run, [from, to]) in found.runs.iter_mut().zip(cropped.as_slice()) {
+            let last = if *to < far { ((to - near) / step).floor().min(last) } else { last };
+            *run = [before(*from).max(first) as f32, last as f32];
+        }
+        // A packet ends with the first run that no ray has.
+        found.runs.sort_by_key(|[first, last]| first > last);
+        Some(found)
     }
 }
 
@@ -179,8 +218,8 @@ impl Volume {
 mod tests {
     use super::super::reference::samples_reference;
     use super::super::{
-        GradientOpacity, Interpolation, Volume, VolumeHighlight, VolumeLight, VolumeOptions,
-        VolumeQuality, VolumeShading, integrate_reference,
+        ClipPlane, Cropping, GradientOpacity, Interpolation, Volume, VolumeHighlight, VolumeLight,
+        VolumeOptions, VolumeQuality, VolumeShading, integrate_reference,
     };
     use super::*;
     use crate::colormap::ColorMap;
@@ -188,7 +227,7 @@ mod tests {
     use crate::simd::SimdLevel;
     use crate::test_shapes::Random;
     use crate::transfer_function::TransferFunction;
-    use glam::Vec3;
+    use glam::{UVec3, Vec3};
     use std::sync::Arc;
 
     /// A level of 255, of which a tenth is what f32 and rounding may cost.
@@ -319,7 +358,13 @@ mod tests {
     #[test]
     fn rays_have_the_same_bits_alone_in_packets_and_with_every_instruction_set() {
         for (dims, spacing, scale, distance) in cases() {
-            for options in options() {
+            let size = spacing * (dims - 1).as_dvec3();
+            let plane = ClipPlane { point: 0.4 * size, normal: DVec3::new(1.0, 0.5, -0.2) };
+            let fence = Cropping { planes: [0.3 * size, 0.6 * size], regions: 0x2eb_feba };
+            let cut = |o: VolumeOptions| {
+                [o.clone(), VolumeOptions { clip_planes: vec![plane], cropping: Some(fence), ..o }]
+            };
+            for options in options().into_iter().flat_map(cut) {
                 let options = VolumeOptions { sample_distance: Some(distance), ..options };
                 let v = volume(dims, spacing, scale, options);
                 let rays = rays(70, (spacing * (dims - 1).as_dvec3()).as_vec3(), 11);

@@ -1,6 +1,7 @@
 //! Gradients of a cell, and shading by lights.
 
-use super::{GradientOpacity, Volume, VolumeHighlight, VolumeShading, within};
+use super::region::in_box;
+use super::{GradientOpacity, Volume, VolumeHighlight, VolumeShading};
 use crate::grid::Grid;
 use crate::grid_walk::IndexRay;
 use glam::{DVec3, UVec3, Vec3};
@@ -47,9 +48,8 @@ impl Volume {
     /// starts at `o` in object space and goes along `d`. Not a unit vector.
     pub(super) fn view_along(&self, o: DVec3, d: DVec3) -> DVec3 {
         let Some(viewer) = self.options.viewer else { return d };
-        let extent = self.grid.spacing * (self.dims - UVec3::ONE).as_dvec3();
-        let (near, far) = within(o, d, extent);
-        let view = o + d * near.max(0.0) - viewer;
+        let [near, far] = in_box(o, d, self.drawn_box(), 0.0, f64::INFINITY);
+        let view = o + d * near - viewer;
         // A ray that misses the grid, or begins at the viewer.
         if near < far && view.length_squared() > 0.0 { view } else { d }
     }
