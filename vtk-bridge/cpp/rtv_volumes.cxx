@@ -20,6 +20,7 @@
 #include <vtkMatrix4x4.h>
 #include <vtkMultiBlockVolumeMapper.h>
 #include <vtkPiecewiseFunction.h>
+#include <vtkPlane.h>
 #include <vtkPlaneCollection.h>
 #include <vtkSmartVolumeMapper.h>
 #include <vtkUnsignedCharArray.h>
@@ -119,6 +120,7 @@ void ReadMapper(vtkVolumeMapper* mapper, RtvVolumeFacts& facts)
 {
   vtkPlaneCollection* planes = mapper->GetClippingPlanes();
   facts.cropping = mapper->GetCropping() ? 1 : 0;
+  facts.cropping_regions = static_cast<uint32_t>(mapper->GetCroppingRegionFlags());
   facts.num_clipping_planes = planes ? static_cast<uint32_t>(planes->GetNumberOfItems()) : 0;
   facts.blend_mode = static_cast<uint32_t>(mapper->GetBlendMode());
   auto gpu = vtkGPUVolumeRayCastMapper::SafeDownCast(mapper);
@@ -197,6 +199,7 @@ vtkDataArray* ReadImage(vtkVolumeMapper* mapper, vtkImageData* image, RtvVolumeF
     facts.dims[axis] = static_cast<uint32_t>(std::max(0, extent[2 * axis + 1] - extent[2 * axis] + 1));
   }
   facts.image = 1;
+  facts.turned = image->GetDirectionMatrix()->IsIdentity() ? 0 : 1;
   facts.blanked = image->HasAnyBlankPoints() || image->HasAnyBlankCells() ? 1 : 0;
   vtkDataArray* scalars = vtkAbstractMapper::GetScalars(
     image, mapper->GetScalarMode(), mapper->GetArrayAccessMode(), mapper->GetArrayId(), mapper->GetArrayName(), cellFlag);
@@ -253,6 +256,38 @@ void ReadMatrix(vtkVolume* volume, vtkImageData* image, vtkMatrix4x4* world)
   vtkMatrix4x4::Multiply4x4(volume->GetMatrix(), local, world);
 }
 
+// What is drawn of the volume: cropping planes are in the image's space, clipping planes in the
+// world.
+void ReadRegion(vtkVolumeMapper* mapper, vtkImageData* image, RtvVolume& v, std::vector<double>& planes)
+{
+  v.cropping_in_texels = mapper->IsA("vtkFixedPointVolumeRayCastMapper") ? 0 : 1;
+#if VTK_VERSION_NUMBER < VTK_VERSION_CHECK(9, 3, 0)
+  v.clipping_in_texels = v.cropping_in_texels;
+#endif
+  if (mapper->GetCropping())
+  {
+    const int* extent = image->GetExtent();
+    double first[3];
+    image->TransformIndexToPhysicalPoint(extent[0], extent[2], extent[4], first);
+    v.cropping_regions = static_cast<uint32_t>(mapper->GetCroppingRegionFlags());
+    for (int i = 0; i < 6; ++i)
+    {
+      v.cropping_planes[i] = mapper->GetCroppingRegionPlanes()[i] - first[i / 2];
+    }
+  }
+  if (vtkPlaneCollection* clipping = mapper->GetClippingPlanes())
+  {
+    vtkCollectionSimpleIterator it;
+    clipping->InitTraversal(it);
+    while (vtkPlane* plane = clipping->GetNextPlane(it))
+    {
+      planes.insert(planes.end(), plane->GetOrigin(), plane->GetOrigin() + 3);
+      planes.insert(planes.end(), plane->GetNormal(), plane->GetNormal() + 3);
+    }
+    v.clip_planes = RtvArray{ planes.data(), planes.size() / 6, 6, RTV_F64 };
+  }
+}
+
 const char* AddGrid(RtvBridge* bridge, vtkVolumeMapper* mapper, vtkVolume* volume, vtkImageData* image, vtkCamera* camera,
   const Lights& lights, const std::string& name, RtvVolumeFacts& facts)
 {
@@ -307,6 +342,10 @@ const char* AddGrid(RtvBridge* bridge, vtkVolumeMapper* mapper, vtkVolume* volum
   ReadMatrix(volume, image, world);
   std::copy(&world->Element[0][0], &world->Element[0][0] + 16, v.world_from_data);
 
+  std::vector<double> planes;
+  v.cells = facts.cell_scalars;
+  ReadRegion(mapper, image, v, planes);
+
   // ---- Tables over the range of the scalars, as OpenGL's are.
   v.blend = facts.blend_mode;
   std::vector<float> colors(3 * Entries), opacities(Entries), gradients;
@@ -346,13 +385,13 @@ const char* AddGrid(RtvBridge* bridge, vtkVolumeMapper* mapper, vtkVolume* volum
   }
   if (HasGradientOpacity(property))
   {
-    // OpenGL takes central differences over n / (n - 1) of the point spacing, and scales them by
-    // the mean of the spacings.
+    // OpenGL takes central differences over n / (n - 1) of the point spacing, or over that of cells,
+    // and scales them by the mean of the spacings.
     double spacing = 0.0, reach = 0.0;
     for (int axis = 0; axis < 3; ++axis)
     {
       spacing += v.spacing[axis] / 3.0;
-      reach += v.dims[axis] / (v.dims[axis] - 1.0) / 3.0;
+      reach += (v.cells ? 1.0 : v.dims[axis] / (v.dims[axis] - 1.0)) / 3.0;
     }
     const double steepest = GradientRange * (v.range[1] - v.range[0]);
     gradients.resize(Entries);
@@ -437,20 +476,23 @@ void rtvChooseVolume(RtvBridge* bridge, vtkVolume* volume, vtkRenderer* renderer
   v.facts = &facts;
   v.view = &view;
 
-  // ---- A few scalars.
+  // ---- A few scalars. Those of cells stand for themselves.
+  uint32_t dims[3];
   uint64_t count = 1;
   for (int axis = 0; axis < 3; ++axis)
   {
-    v.dims[axis] = std::min(facts.dims[axis], FewPoints);
+    dims[axis] = facts.dims[axis] - (facts.cell_scalars && facts.dims[axis] > 0 ? 1 : 0);
+    v.dims[axis] = std::min(dims[axis], FewPoints);
     count *= v.dims[axis];
   }
-  if (count == 0 || scalars->GetNumberOfTuples() != image->GetNumberOfPoints())
+  const vtkIdType values = facts.cell_scalars ? image->GetNumberOfCells() : image->GetNumberOfPoints();
+  if (count == 0 || scalars->GetNumberOfTuples() != values)
   {
     return;
   }
   const auto at = [&](int axis, uint64_t i) {
     const uint64_t last = std::max(v.dims[axis], 2u) - 1;
-    return (i * (facts.dims[axis] - 1) + last / 2) / last;
+    return (i * (dims[axis] - 1) + last / 2) / last;
   };
   std::vector<float> few;
   few.reserve(count);
@@ -458,7 +500,7 @@ void rtvChooseVolume(RtvBridge* bridge, vtkVolume* volume, vtkRenderer* renderer
   {
     for (uint64_t j = 0; j < v.dims[1]; ++j)
     {
-      const uint64_t row = (at(2, k) * facts.dims[1] + at(1, j)) * facts.dims[0];
+      const uint64_t row = (at(2, k) * dims[1] + at(1, j)) * dims[0];
       for (uint64_t i = 0; i < v.dims[0]; ++i)
       {
         few.push_back(static_cast<float>(scalars->GetComponent(static_cast<vtkIdType>(row + at(0, i)), 0)));

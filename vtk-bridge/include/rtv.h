@@ -215,7 +215,7 @@ typedef struct RtvVolume {
   char const* name;
   /* Changes whenever the scalars change; 0: not known. */
   uint64_t scalar_key;
-  /* One number of any kind per point, x fastest; none when rtv_has_volume says that they are kept. */
+  /* One number of any kind per point, or per cell with cells, x fastest; none when rtv_has_volume says that they are kept. */
   RtvArray scalars;
   /* Points per axis. */
   uint32_t dims[3];
@@ -261,6 +261,18 @@ typedef struct RtvVolume {
   uint32_t has_viewer;
   /* Scalars of the surfaces of RTV_BLEND_ISOSURFACES, f64. */
   RtvArray isovalues;
+  /* 1: the scalars belong to the cells between the points. */
+  uint32_t cells;
+  /* Regions that are drawn, bit x + 3 y + 9 z, where 0, 1 and 2 stand for below, between and above the planes of an axis; 0: all of the volume. */
+  uint32_t cropping_regions;
+  /* Lower and upper plane of each axis, data units, with cropping_regions. */
+  double cropping_planes[6];
+  /* Planes that cut off what is behind them, in the world: a point and the normal of each. */
+  RtvArray clip_planes;
+  /* 1: cropping planes are where OpenGL's mapper has them, which takes the grid for half a cell larger on each side, unless the scalars are those of cells. */
+  uint32_t cropping_in_texels;
+  /* 1: so are clipping planes, as before VTK 9.3. */
+  uint32_t clipping_in_texels;
 } RtvVolume;
 /* A light that is on. */
 typedef struct RtvLight {
@@ -506,6 +518,10 @@ typedef struct RtvVolumeFacts {
   uint32_t cell_scalars;
   /* Numbers per scalar. */
   uint32_t num_components;
+  /* 1 if the axes of the image are not those of its space. */
+  uint32_t turned;
+  /* With cropping: which regions are drawn, with VTK's flags. */
+  uint32_t cropping_regions;
   /* As in RtvVolume. */
   double range[2];
   /* Scalars that RTV_BLEND_AVERAGE takes the mean of. */
@@ -566,7 +582,7 @@ typedef struct RtvSceneVolume {
   double world_from_unit[16];
 } RtvSceneVolume;
 /* Version of this interface, computed from its structures and calls (a test gives the value). A shim built for another version must not continue. */
-#define RTV_ABI 1760331924u
+#define RTV_ABI 2129185655u
 /* All calls in one table, so that a shim needs only one symbol. */
 typedef struct RtvApi {
   /* rtv_abi. */

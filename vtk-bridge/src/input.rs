@@ -6,6 +6,7 @@
 //! [`crate::bridge::Bridge::add_surface`] needs them.
 
 use rt_core::glam::{DMat4, DVec3};
+pub use rt_core::volume::Cropping;
 
 /// Point coordinates, three per point.
 #[derive(Debug, Clone, Copy)]
@@ -365,8 +366,12 @@ pub struct Volume<'a> {
     pub name: &'a str,
     /// Changes whenever the scalars change; 0 is never cached.
     pub key: u64,
-    /// One per point, x fastest. Not read if [`crate::bridge::Bridge::has_volume`] returns true.
+    /// One per point, or per cell with `cells`, x fastest. Not read if
+    /// [`crate::bridge::Bridge::has_volume`] returns true.
     pub scalars: Scalars<'a>,
+    /// The scalars belong to the cells between the points. A scalar is that of its cell's centre,
+    /// and half a cell from the bounds it changes no more, as in OpenGL's textures.
+    pub cells: bool,
     /// Points per axis.
     pub dims: [u32; 3],
     /// Distance between neighbouring points, data units; positive.
@@ -402,6 +407,15 @@ pub struct Volume<'a> {
     /// How a ray combines the scalars. All modes but [`VolumeBlend::Composite`] use the opacities
     /// unchanged, independent of the thickness.
     pub blend: VolumeBlend<'a>,
+    /// What is drawn; `None` for all of it. Planes are in data units.
+    pub cropping: Option<Cropping>,
+    /// Half-spaces that are drawn: for each a point of the plane and its normal, in the world.
+    pub clip_planes: &'a [[f64; 6]],
+    /// Cropping planes are where OpenGL's mapper has them: its shader compares them with coordinates
+    /// of texels, in which a grid of n points is n wide, and not n - 1.
+    pub cropping_in_texels: bool,
+    /// So are clipping planes, as in OpenGL's mapper before VTK 9.3.
+    pub clipping_in_texels: bool,
 }
 
 /// `vtkVolumeMapper`'s blend modes.

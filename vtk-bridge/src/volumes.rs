@@ -9,8 +9,8 @@ use rt_core::grid::Grid;
 use rt_core::scene::VolumeInstance;
 use rt_core::transfer_function::TransferFunction;
 use rt_core::volume::{
-    Blend, GradientOpacity, Interpolation, Volume, VolumeHighlight, VolumeLight, VolumeOptions,
-    VolumeShading,
+    Blend, ClipPlane, Cropping, GradientOpacity, Interpolation, Volume, VolumeHighlight,
+    VolumeLight, VolumeOptions, VolumeShading,
 };
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -69,39 +69,30 @@ impl VolumeCache {
         // Lights are stored in the volume's axes, so a rotated volume has a different appearance.
         let lights = lights(v, place)?;
         let appearance = appearance_hash(v, &lights);
-        let from_world = place.inverse();
-        let viewer = v.viewer.filter(|_| v.shading.is_some());
-        let viewer = viewer.map(|eye| from_world.transform_point3(eye));
+        let place = place * DAffine3::from_translation(-border(v));
+        let seen = Seen::of(v, place);
         (v.key, appearance).hash(content);
-        format!("{viewer:?}").hash(content);
-        format!("{place:?}").hash(content);
+        format!("{seen:?}{place:?}").hash(content);
         let kept = self.kept.get_mut(&v.key).filter(|_| v.key != 0);
         let volume = match kept {
             Some(kept) if kept.appearance == appearance => {
                 kept.used = true;
-                if kept.volume.options().viewer != viewer {
-                    let mut moved = Volume::clone(&kept.volume);
-                    moved.set_viewer(viewer).map_err(|e| format!("a volume: {e}"))?;
-                    kept.volume = Arc::new(moved);
+                if !seen.is_of(&kept.volume) {
+                    kept.volume = seen.applied(&kept.volume)?;
                 }
                 Arc::clone(&kept.volume)
             }
             Some(kept) => {
                 let grid = Arc::clone(kept.volume.grid());
                 *kept = CachedVolume {
-                    volume: Arc::new(medium(v, viewer, grid, lights)?),
+                    volume: Arc::new(medium(v, seen, grid, lights)?),
                     appearance,
                     used: true,
                 };
                 Arc::clone(&kept.volume)
             }
             None => {
-                let [x, y, z] = v.spacing;
-                let values = values(&v.scalars);
-                let grid =
-                    Grid::new(UVec3::from_array(v.dims), DVec3::ZERO, DVec3::new(x, y, z), values)
-                        .map_err(|e| format!("a volume: {e}"))?;
-                let volume = Arc::new(medium(v, viewer, Arc::new(grid), lights)?);
+                let volume = Arc::new(medium(v, seen, Arc::new(grid(v)?), lights)?);
                 self.kept.insert(
                     v.key,
                     CachedVolume { volume: Arc::clone(&volume), appearance, used: true },
@@ -119,14 +110,109 @@ impl VolumeCache {
     }
 }
 
-/// Hash of everything except the scalars, the transform and the viewer.
+/// From the first point of a volume's grid to that of its data: half a cell for scalars of cells,
+/// whose grid has one more around them.
+fn border(v: &Input<'_>) -> DVec3 {
+    if v.cells { 0.5 * DVec3::from_array(v.spacing) } else { DVec3::ZERO }
+}
+
+/// The grid of the scalars. Scalars of cells are at their centres; around them are those of the
+/// outermost cells again, so that between the centres and the bounds nothing changes.
+fn grid(v: &Input<'_>) -> Result<Grid, String> {
+    let scalars = values(&v.scalars);
+    let dims = UVec3::from_array(v.dims);
+    let (dims, scalars) = if v.cells {
+        let cells = dims.saturating_sub(UVec3::ONE);
+        let [wanted, given] = [cells.as_u64vec3().element_product(), scalars.len() as u64];
+        if wanted == 0 || wanted != given {
+            return Err(format!("a volume of {dims} points with {given} scalars of cells"));
+        }
+        (cells + 2, with_border(cells, &scalars))
+    } else {
+        (dims, scalars)
+    };
+    let [x, y, z] = v.spacing;
+    Grid::new(dims, DVec3::ZERO, DVec3::new(x, y, z), scalars).map_err(|e| format!("a volume: {e}"))
+}
+
+/// A lattice of numbers with the outermost ones twice on each side; `dims` are not zero.
+fn with_border(dims: UVec3, inner: &[f32]) -> Vec<f32> {
+    let [nx, ny, nz] = dims.as_usizevec3().to_array();
+    let mut out = Vec::with_capacity((nx + 2) * (ny + 2) * (nz + 2));
+    let within = |i: usize, n: usize| i.saturating_sub(1).min(n - 1);
+    for z in 0..nz + 2 {
+        for y in 0..ny + 2 {
+            let first = (within(z, nz) * ny + within(y, ny)) * nx;
+            let row = &inner[first..first + nx];
+            out.push(row[0]);
+            out.extend_from_slice(row);
+            out.push(row[nx - 1]);
+        }
+    }
+    out
+}
+
+/// What changes with the view or while the user cuts the volume, in the axes of its grid.
+#[derive(Debug, Clone, PartialEq)]
+struct Seen {
+    viewer: Option<DVec3>,
+    clip_planes: Vec<ClipPlane>,
+    cropping: Option<Cropping>,
+}
+
+impl Seen {
+    /// For a grid at `place`.
+    fn of(v: &Input<'_>, place: DAffine3) -> Seen {
+        let from_world = place.inverse();
+        let viewer = v.viewer.filter(|_| v.shading.is_some());
+        // Planes in coordinates of texels are stretched from the middle of the grid.
+        let points = UVec3::from_array(v.dims).max(UVec3::splat(2)).as_dvec3();
+        let middle = border(v) + 0.5 * (points - 1.0) * DVec3::from_array(v.spacing);
+        let stretch = |in_texels: bool| {
+            if in_texels && !v.cells { points / (points - 1.0) } else { DVec3::ONE }
+        };
+        let moved = |point: DVec3, stretch: DVec3| middle + (point - middle) * stretch;
+        let of_clipping = stretch(v.clipping_in_texels);
+        let clip_planes = v
+            .clip_planes
+            .iter()
+            .map(|&[x, y, z, nx, ny, nz]| ClipPlane {
+                point: moved(from_world.transform_point3(DVec3::new(x, y, z)), of_clipping),
+                normal: place.matrix3.transpose() * DVec3::new(nx, ny, nz) / of_clipping,
+            })
+            .collect();
+        let of_cropping = stretch(v.cropping_in_texels);
+        let cropping = v.cropping.map(|c| Cropping {
+            planes: c.planes.map(|corner| moved(corner + border(v), of_cropping)),
+            ..c
+        });
+        Seen { viewer: viewer.map(|eye| from_world.transform_point3(eye)), clip_planes, cropping }
+    }
+
+    fn is_of(&self, volume: &Volume) -> bool {
+        let o = volume.options();
+        o.viewer == self.viewer && o.clip_planes == self.clip_planes && o.cropping == self.cropping
+    }
+
+    fn applied(self, volume: &Volume) -> Result<Arc<Volume>, String> {
+        let mut changed = volume.clone();
+        changed
+            .set_viewer(self.viewer)
+            .and_then(|()| changed.set_clipping(self.clip_planes, self.cropping))
+            .map_err(|e| format!("a volume: {e}"))?;
+        Ok(Arc::new(changed))
+    }
+}
+
+/// Hash of everything except the scalars, the transform and what [`Seen`] holds.
 fn appearance_hash(v: &Input<'_>, lights: &[VolumeLight]) -> u64 {
     let mut h = DefaultHasher::new();
     let tables = v.colors.iter().flatten().chain(v.opacities).chain(v.gradient_opacities);
     tables.for_each(|x| x.to_bits().hash(&mut h));
     format!("{:?}{:?}{:?}{:?}{:?}", v.nearest, v.range, v.unit_distance, v.shading, v.spacing)
         .hash(&mut h);
-    format!("{:?}{:?}{:?}{lights:?}", v.steepest, v.blend, v.sample_distance).hash(&mut h);
+    format!("{:?}{:?}{:?}{lights:?}{}", v.steepest, v.blend, v.sample_distance, v.cells)
+        .hash(&mut h);
     h.finish()
 }
 
@@ -168,7 +254,7 @@ fn values(scalars: &Scalars<'_>) -> Vec<f32> {
 
 fn medium(
     v: &Input<'_>,
-    viewer: Option<DVec3>,
+    seen: Seen,
     grid: Arc<Grid>,
     lights: Vec<VolumeLight>,
 ) -> Result<Volume, String> {
@@ -233,7 +319,13 @@ fn medium(
         lights,
         gradient_opacity,
         clamped_gradients,
-        viewer,
+        viewer: seen.viewer,
+        bounds: v.cells.then(|| {
+            let cells = UVec3::from_array(v.dims).saturating_sub(UVec3::ONE).as_dvec3();
+            [border(v), border(v) + cells * DVec3::from_array(v.spacing)]
+        }),
+        clip_planes: seen.clip_planes,
+        cropping: seen.cropping,
     };
     Volume::new(grid, transfer, options).map_err(|e| format!("a volume: {e}"))
 }
@@ -258,7 +350,7 @@ fn straight(points: Vec<[f32; 2]>) -> Vec<[f32; 2]> {
 /// it, where that is in front of `depth`. What OpenGL draws nearer appears in front of the volume;
 /// what it draws further away is seen through the volume.
 pub(crate) fn place_in_depth(volumes: &[VolumeInstance], view: &View, depth: &mut [f32]) {
-    let boxes: Vec<BoxInClip> = volumes.iter().map(|v| BoxInClip::new(v, view)).collect();
+    let boxes: Vec<BoxInClip<'_>> = volumes.iter().map(|v| BoxInClip::new(v, view)).collect();
     let width = view.width as usize;
     depth.par_chunks_mut(width.max(1)).enumerate().for_each(|(row, depth)| {
         let y = 1.0 - 2.0 * (row as f64 + 0.5) / f64::from(view.height);
@@ -274,25 +366,31 @@ pub(crate) fn place_in_depth(volumes: &[VolumeInstance], view: &View, depth: &mu
     });
 }
 
-/// The box of a volume, for rays through pixels.
-struct BoxInClip {
+/// The box of what is drawn of a volume, for rays through pixels.
+struct BoxInClip<'a> {
     object_from_clip: DMat4,
     clip_from_object: DMat4,
     min: DVec3,
     max: DVec3,
+    clip_planes: &'a [ClipPlane],
 }
 
-impl BoxInClip {
-    fn new(v: &VolumeInstance, view: &View) -> BoxInClip {
+impl BoxInClip<'_> {
+    fn new<'a>(v: &'a VolumeInstance, view: &View) -> BoxInClip<'a> {
         let b = v.volume.bounds();
+        let [mut min, mut max] = [b.min.as_dvec3(), b.max.as_dvec3()];
+        if let Some(c) = v.volume.options().cropping.filter(Cropping::is_box) {
+            (min, max) = (min.max(c.planes[0]), max.min(c.planes[1]));
+        }
         let to_object =
             DAffine3::from_translation(-v.volume.origin()) * v.world_from_object.inverse();
         let object_from_clip = DMat4::from(to_object) * view.clip_from_world.inverse();
         BoxInClip {
             object_from_clip,
             clip_from_object: view.clip_from_world * DMat4::from(to_object.inverse()),
-            min: b.min.as_dvec3(),
-            max: b.max.as_dvec3(),
+            min,
+            max,
+            clip_planes: &v.volume.options().clip_planes,
         }
     }
 
@@ -313,6 +411,12 @@ impl BoxInClip {
             // make the interval empty, as intended.
             near = near.max(u[axis].min(v[axis]));
             far = far.min(u[axis].max(v[axis]));
+        }
+        for plane in self.clip_planes {
+            let (before, slope) = (plane.normal.dot(plane.point - a), plane.normal.dot(along));
+            // For rays along the plane, infinities do as above.
+            let t = before / slope;
+            if slope < 0.0 { far = far.min(t) } else { near = near.max(t) }
         }
         (near < far).then(|| {
             let middle = a + along * (0.5 * (near + far));

@@ -41,6 +41,11 @@ fn image(one_layer: bool, brightness: f32) -> WindowImage {
             gradient_opacities: &[],
             steepest: 0.0,
             blend: VolumeBlend::Composite,
+            cells: false,
+            cropping: None,
+            clip_planes: &[],
+            cropping_in_texels: false,
+            clipping_in_texels: false,
         })
         .expect("a volume");
     let view = View {

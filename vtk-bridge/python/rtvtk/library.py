@@ -4,7 +4,7 @@ import os
 
 import numpy as np
 
-ABI = 1760331924
+ABI = 2129185655
 #: The first VTK whose renderers Python can replace.
 OLDEST_VTK = (9, 4)
 NONE, U8, F32, F64, I32, I64 = range(6)
@@ -70,6 +70,8 @@ class Volume(C.Structure):
         ("unit_distance", C.c_double), ("sample_distance", C.c_double), ("viewer", C.c_double * 3), ("shade", C.c_uint32), ("ambient", C.c_float), ("diffuse", C.c_float), ("specular", C.c_float),
         ("specular_power", C.c_float), ("specular_mirrored", C.c_uint32), ("lights", Array), ("gradient_opacities", Array),
         ("steepest", C.c_double), ("blend", C.c_uint32), ("has_viewer", C.c_uint32), ("isovalues", Array),
+        ("cells", C.c_uint32), ("cropping_regions", C.c_uint32), ("cropping_planes", C.c_double * 6), ("clip_planes", Array),
+        ("cropping_in_texels", C.c_uint32), ("clipping_in_texels", C.c_uint32),
     ]
 
 
@@ -137,7 +139,7 @@ class VolumeFacts(C.Structure):
     _fields_ += [("specular", C.c_double)]
     _fields_ += [(n, C.c_uint32) for n in ("has_data", "image", "num_blocks")]
     _fields_ += [("dims", C.c_uint32 * 3)]
-    _fields_ += [(n, C.c_uint32) for n in ("blanked", "scalars", "cell_scalars", "num_components")]
+    _fields_ += [(n, C.c_uint32) for n in ("blanked", "scalars", "cell_scalars", "num_components", "turned", "cropping_regions")]
     _fields_ += [(n, C.c_double * 2) for n in ("range", "average_range")]
 
 

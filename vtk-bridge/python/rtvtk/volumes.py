@@ -31,6 +31,7 @@ def _has_gradient_opacity(p):
 
 def _read_mapper(mapper, f):
     f.cropping, f.num_clipping_planes, f.blend_mode = bool(mapper.GetCropping()), mapper.GetNumberOfClippingPlanes(), mapper.GetBlendMode()
+    f.cropping_regions = mapper.GetCroppingRegionFlags()
     f.mask = bool(hasattr(mapper, "GetMaskInput") and mapper.GetMaskInput())
     reach = ("GetGlobalIlluminationReach", "GetVolumetricScatteringBlending")
     f.scattering = any(hasattr(mapper, name) and getattr(mapper, name)() > 0 for name in reach)
@@ -93,6 +94,8 @@ def _scalars_of(mapper, image, f):
     scalars = vtkAbstractMapper.GetScalars(
         image, mapper.GetScalarMode(), mapper.GetArrayAccessMode(), mapper.GetArrayId(), mapper.GetArrayName(), flag)
     f.scalars, f.cell_scalars = scalars is not None, int(flag) != 0
+    directions = image.GetDirectionMatrix()
+    f.turned = any(directions.GetElement(i, j) != (i == j) for i in range(3) for j in range(3))
     if scalars is not None:
         f.num_components = scalars.GetNumberOfComponents()
         low, high = scalars.GetFiniteRange(0)
@@ -136,6 +139,21 @@ def _world_from_image(volume, image):
     return np.array(volume.GetMatrix().GetData()).reshape(4, 4) @ local
 
 
+def _set_region(v, mapper, image, keep):
+    """What is drawn of the volume: cropping planes are in the image's space, clipping planes in the world."""
+    v.cropping_in_texels = not mapper.IsA("vtkFixedPointVolumeRayCastMapper")
+    if mapper.GetCropping():
+        first = [0.0] * 3
+        image.TransformIndexToPhysicalPoint(*image.GetExtent()[::2], first)
+        v.cropping_regions = mapper.GetCroppingRegionFlags()
+        v.cropping_planes[:] = [x - first[i // 2] for i, x in enumerate(mapper.GetCroppingRegionPlanes())]
+    planes = mapper.GetClippingPlanes()
+    if planes is not None and planes.GetNumberOfItems():
+        found = (planes.GetItem(i) for i in range(planes.GetNumberOfItems()))
+        keep.append(np.array([[*plane.GetOrigin(), *plane.GetNormal()] for plane in found], np.float64))
+        v.clip_planes = rtv.Array.of(keep[-1])
+
+
 def _few_scalars(scalars, dims):
     """Scalars at a few points per axis, evenly spread from the first to the last, indexed by z, y and x."""
     few = [min(n, _FEW_POINTS) for n in dims]
@@ -151,14 +169,16 @@ def choose(bridge, volume, renderer, view):
         return
     image = _image_of(mapper, f, update=False)
     scalars = None if image is None else _scalars_of(mapper, image, f)
-    if scalars is None or not scalars.HasStandardMemoryLayout() or scalars.GetNumberOfValues() != math.prod(f.dims):
+    # Those of cells stand for themselves.
+    dims = [n - 1 if f.cell_scalars else n for n in f.dims]
+    if scalars is None or not scalars.HasStandardMemoryLayout() or scalars.GetNumberOfValues() != math.prod(dims):
         return
     f.mapper_class = mapper.GetClassName().encode()
     _read_mapper(mapper, f)
     _read_property(p, f)
     if f.shade:
         _Lights(renderer, f)
-    few, (low, high), opacity = _few_scalars(scalars, list(f.dims)), f.range, p.GetScalarOpacity(0)
+    few, (low, high), opacity = _few_scalars(scalars, dims), f.range, p.GetScalarOpacity(0)
     opacities = np.array([opacity.GetValue(x) for x in np.linspace(low, high, _FEW_ENTRIES).tolist()], np.float32).reshape(-1, 1)
     v = rtv.SceneVolume(facts=C.pointer(f), view=C.pointer(view), scalars=rtv.Array.of(few.reshape(-1, 1)), opacities=rtv.Array.of(opacities))
     v.dims[:] = few.shape[::-1]
@@ -204,6 +224,8 @@ class Volumes:
             v.scalars = rtv.Array.of(numbers(scalars, _KINDS, keep).reshape(-1, 1))
 
         v.world_from_data[:] = _world_from_image(volume, image).ravel().tolist()
+        v.cells = f.cell_scalars
+        _set_region(v, mapper, image, keep)
 
         # ---- Tables over the range of the scalars, as OpenGL's are.
         low, high = v.range[:] = f.range[:]
@@ -219,8 +241,8 @@ class Volumes:
             v.isovalues = rtv.Array.of(keep[-1])
         v.colors, v.opacities, v.blend = rtv.Array.of(colors), rtv.Array.of(opacities), blend
         if gradients is not None:
-            # OpenGL takes central differences over n / (n - 1) of the point spacing, and scales them by the mean of the spacings.
-            reach = sum(n / (n - 1) for n in dims) / 3
+            # OpenGL takes central differences over n / (n - 1) of the point spacing, or over that of cells, and scales them by the mean of the spacings.
+            reach = 1 if v.cells else sum(n / (n - 1) for n in dims) / 3
             v.gradient_opacities, v.steepest = rtv.Array.of(gradients), _GRADIENT_RANGE * (high - low) / (sum(image.GetSpacing()) / 3 * reach)
         v.unit_distance = p.GetScalarOpacityUnitDistance(0)
         v.sample_distance = _sample_distance(mapper, image, dims, volume.GetMatrix())

@@ -4,8 +4,8 @@ use super::facts::{RtvSceneVolume, RtvVolumeFacts};
 use super::types::*;
 use crate::choice::volume_work::VolumeInView;
 use crate::input::{
-    Cells, Color, Glyphs, Ids, Image, LightKind, Maps, PerItem, Points, Property, Scalars,
-    SceneLight, Shading, Shape, Surface, Volume, VolumeBlend,
+    Cells, Color, Cropping, Glyphs, Ids, Image, LightKind, Maps, PerItem, Points, Property,
+    Scalars, SceneLight, Shading, Shape, Surface, Volume, VolumeBlend,
 };
 use rt_core::glam::{DMat4, DVec3};
 
@@ -209,6 +209,7 @@ pub(super) unsafe fn volume<'a>(v: &RtvVolume, name: &'a str) -> Result<Volume<'
             name,
             key: v.scalar_key,
             scalars,
+            cells: v.cells != 0,
             dims: v.dims,
             spacing: v.spacing,
             world_from_data: DMat4::from_cols_array(&v.world_from_data).transpose(),
@@ -240,6 +241,16 @@ pub(super) unsafe fn volume<'a>(v: &RtvVolume, name: &'a str) -> Result<Volume<'
                     return Err(format!("a volume with blending {other}, which does not exist"));
                 }
             },
+            cropping: (v.cropping_regions != 0).then(|| {
+                let [x0, x1, y0, y1, z0, z1] = v.cropping_planes;
+                Cropping {
+                    planes: [DVec3::new(x0, y0, z0), DVec3::new(x1, y1, z1)],
+                    regions: v.cropping_regions,
+                }
+            }),
+            clip_planes: tuples(&v.clip_planes, "clipping planes", RTV_F64)?,
+            cropping_in_texels: v.cropping_in_texels != 0,
+            clipping_in_texels: v.clipping_in_texels != 0,
         })
     }
 }

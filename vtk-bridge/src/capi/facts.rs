@@ -206,6 +206,10 @@ pub struct RtvVolumeFacts {
     pub cell_scalars: u32,
     /// Numbers per scalar.
     pub num_components: u32,
+    /// 1 if the axes of the image are not those of its space.
+    pub turned: u32,
+    /// With cropping: which regions are drawn, with VTK's flags.
+    pub cropping_regions: u32,
     /// As in RtvVolume.
     pub range: [f64; 2],
     /// Scalars that RTV_BLEND_AVERAGE takes the mean of.

@@ -33,7 +33,7 @@ pub struct RtvBridge {
 
 /// Version of this interface, computed from its structures and calls (a test gives the value). A
 /// shim built for another version must not continue.
-pub const RTV_ABI: u32 = 1_760_331_924;
+pub const RTV_ABI: u32 = 2_129_185_655;
 
 /// [`RTV_ABI`] of the library.
 #[unsafe(no_mangle)]

@@ -233,8 +233,8 @@ pub struct RtvVolume {
     pub name: *const c_char,
     /// Changes whenever the scalars change; 0: not known.
     pub scalar_key: u64,
-    /// One number of any kind per point, x fastest; none when rtv_has_volume says that they are
-    /// kept.
+    /// One number of any kind per point, or per cell with cells, x fastest; none when
+    /// rtv_has_volume says that they are kept.
     pub scalars: RtvArray,
     /// Points per axis.
     pub dims: [u32; 3],
@@ -284,6 +284,20 @@ pub struct RtvVolume {
     pub has_viewer: u32,
     /// Scalars of the surfaces of RTV_BLEND_ISOSURFACES, f64.
     pub isovalues: RtvArray,
+    /// 1: the scalars belong to the cells between the points.
+    pub cells: u32,
+    /// Regions that are drawn, bit x + 3 y + 9 z, where 0, 1 and 2 stand for below, between and
+    /// above the planes of an axis; 0: all of the volume.
+    pub cropping_regions: u32,
+    /// Lower and upper plane of each axis, data units, with cropping_regions.
+    pub cropping_planes: [f64; 6],
+    /// Planes that cut off what is behind them, in the world: a point and the normal of each.
+    pub clip_planes: RtvArray,
+    /// 1: cropping planes are where OpenGL's mapper has them, which takes the grid for half a cell
+    /// larger on each side, unless the scalars are those of cells.
+    pub cropping_in_texels: u32,
+    /// 1: so are clipping planes, as before VTK 9.3.
+    pub clipping_in_texels: u32,
 }
 
 /// A light that is on.

@@ -112,6 +112,14 @@ pub(crate) const EXCEPTIONS: &[Exception] = &[
     ("volume_lights", "kit_turned", None, LEFT_BEHIND),
     ("volume_lights", "turned", None, LEFT_BEHIND),
     ("volume_lights", "camera_turned", Some(SHADED), "as shaded volumes"),
+    ("volume_regions", "cells_shaded", Some(SHADED), "as shaded volumes"),
+    ("volume_regions", "plane_and_light", Some(SHADED), "as shaded volumes"),
+    (
+        "volume_regions",
+        "largest_in_a_box",
+        Some(Limits { color_strays: 0.001, ..Limits::STRICT }),
+        "where the largest scalar lies on a plane of the cropping, OpenGL's samples end before it",
+    ),
     (
         "volumes",
         "translucent_inside",
@@ -198,6 +206,7 @@ scripts! {
     volumes_mix_with_surfaces: "volume",
     projections_of_volumes_are_as_in_stock_vtk: "volume_blends",
     shaded_volumes_under_any_lights_are_as_in_stock_vtk: "volume_lights",
+    parts_of_volumes_and_scalars_of_cells_are_as_in_stock_vtk: "volume_regions",
     volumes_are_as_in_stock_vtk: "volumes",
     edges_are_as_smooth_as_the_windows_samples: "window_samples",
     windows_come_and_go: "windows",

@@ -104,6 +104,8 @@ const VOLUME: RtvVolumeFacts = RtvVolumeFacts {
     scalars: 1,
     cell_scalars: 0,
     num_components: 1,
+    turned: 0,
+    cropping_regions: 1 << 13,
     range: [0.0, 1.0],
     average_range: [-1e30, 1e30],
 };
@@ -256,8 +258,11 @@ fn glyph_rows(r: &mut Rows) {
 }
 
 fn volume_rows(r: &mut Rows) {
-    r.volume(|f| f.cropping = 1, "a cropped volume");
-    r.volume(|f| f.num_clipping_planes = 1, "a volume with clipping planes");
+    r.volume(
+        |f| (f.cropping, f.cropping_regions, f.blend_mode) = (1, 7, RTV_BLEND_ADDITIVE),
+        "a volume cropped to more than a box, with another blending than composite",
+    );
+    r.volume(|f| (f.cropping, f.turned) = (1, 1), "a cropped volume with turned axes");
     r.volume(|f| f.mask = 1, "a volume with a mask");
     r.volume(|f| f.scattering = 1, "a volume with shadows or scattering of its own");
     r.volume(|f| f.vectors = 1, "a volume of vectors");
@@ -286,7 +291,6 @@ fn volume_rows(r: &mut Rows) {
     r.volume(|f| f.dims[1] = 1, "a volume one point thick");
     r.volume(|f| f.blanked = 1, "a volume with blanked parts");
     r.volume(|f| f.scalars = 0, "a volume without scalars");
-    r.volume(|f| f.cell_scalars = 1, "a volume of cells' values");
     r.volume(|f| f.num_components = 3, "a volume of several components");
     r.volume(
         |f| (f.blend_mode, f.average_range) = (RTV_BLEND_AVERAGE, [0.1, 2.0]),
@@ -299,6 +303,20 @@ fn volume_rows(r: &mut Rows) {
         ("OpenGL draws volumes of this class", "OpenGL draws volume mappers of this class");
     r.0.push((with_classes("vtkMultiVolume", "vtkSmartVolumeMapper"), of_class));
     r.0.push((with_classes("vtkVolume", ""), of_mapper));
+    let of_fixed_point = |change: &dyn Fn(&mut RtvVolumeFacts)| {
+        let mut facts = VOLUME;
+        change(&mut facts);
+        let reason = volume(&facts, "vtkVolume", "vtkFixedPointVolumeRayCastMapper");
+        reason.unwrap_or("none").to_owned()
+    };
+    r.0.push((
+        of_fixed_point(&|f| f.cell_scalars = 1),
+        "a volume of cells' values, which its mapper refuses",
+    ));
+    r.0.push((
+        of_fixed_point(&|f| f.cropping = 1),
+        "a volume that is cropped by vtkFixedPointVolumeRayCastMapper",
+    ));
 }
 
 /// The reasons in the sources: texts of several words outside comments.

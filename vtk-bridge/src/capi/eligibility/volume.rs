@@ -6,14 +6,17 @@ use super::super::types::{
     RTV_BLEND_MINIMUM,
 };
 use super::first;
+use rt_core::volume::Cropping;
 
 const VOLUMES: [&str; 2] = ["vtkVolume", "vtkPVLODVolume"];
+
+const FIXED_POINT: &str = "vtkFixedPointVolumeRayCastMapper";
 
 const VOLUME_MAPPERS: [&str; 5] = [
     "vtkSmartVolumeMapper",
     "vtkGPUVolumeRayCastMapper",
     "vtkOpenGLGPUVolumeRayCastMapper",
-    "vtkFixedPointVolumeRayCastMapper",
+    FIXED_POINT,
     "vtkMultiBlockVolumeMapper",
 ];
 
@@ -31,14 +34,21 @@ pub(in crate::capi) fn volume(
 ) -> Option<&'static str> {
     let projection = matches!(f.blend_mode, RTV_BLEND_MAXIMUM | RTV_BLEND_MINIMUM);
     let shade = f.shade != 0;
+    let fixed = mapper_class == FIXED_POINT;
     let (data, image) = (f.has_data != 0, f.has_data != 0 && f.image != 0);
     let [low, high] = f.range;
     let [from, to] = f.average_range;
     first(&[
         (!VOLUMES.contains(&volume_class), "OpenGL draws volumes of this class"),
         (!VOLUME_MAPPERS.contains(&mapper_class), "OpenGL draws volume mappers of this class"),
-        (f.cropping != 0, "a cropped volume"),
-        (f.num_clipping_planes > 0, "a volume with clipping planes"),
+        (
+            f.cropping != 0
+                && f.cropping_regions != Cropping::BOX
+                && f.blend_mode != RTV_BLEND_COMPOSITE,
+            "a volume cropped to more than a box, with another blending than composite",
+        ),
+        // It crops elsewhere where the extent of the image does not begin at zero.
+        (f.cropping != 0 && fixed, "a volume that is cropped by vtkFixedPointVolumeRayCastMapper"),
         (f.mask != 0, "a volume with a mask"),
         (f.scattering != 0, "a volume with shadows or scattering of its own"),
         (f.vectors != 0, "a volume of vectors"),
@@ -68,7 +78,11 @@ pub(in crate::capi) fn volume(
         (image && f.dims.iter().any(|n| *n <= 1), "a volume one point thick"),
         (image && f.blanked != 0, "a volume with blanked parts"),
         (image && f.scalars == 0, "a volume without scalars"),
-        (image && f.cell_scalars != 0, "a volume of cells' values"),
+        (image && f.cropping != 0 && f.turned != 0, "a cropped volume with turned axes"),
+        (
+            image && f.cell_scalars != 0 && fixed,
+            "a volume of cells' values, which its mapper refuses",
+        ),
         (image && f.num_components != 1, "a volume of several components"),
         (
             image && f.blend_mode == RTV_BLEND_AVERAGE && (from > low || to < high),

@@ -180,22 +180,20 @@ def volume(reason):
     return mapper, p, data
 
 
-mapper, _, _ = volume("a cropped volume")
+mapper, _, _ = volume("a volume cropped to more than a box, with another blending than composite")
 mapper.CroppingOn()
 mapper.SetCroppingRegionPlanes(-2, 2, -2, 2, -2, 2)
-half(volume("a volume with clipping planes")[0])
+mapper.SetCroppingRegionFlagsToFence()
+mapper.SetBlendModeToAdditive()
+mapper, _, data = volume("a cropped volume with turned axes")
+mapper.CroppingOn()
+data.SetDirectionMatrix(0, 1, 0, -1, 0, 0, 0, 0, 1)
 mapper, p, _ = volume("a shaded volume with maximum or minimum intensity blending")
 mapper.SetBlendModeToMaximumIntensity()
 p.ShadeOn()
 _, p, _ = volume("a shaded volume with a highlight under other lights than one white headlight")
 p.ShadeOn()
 p.SetSpecular(0.5)
-_, _, data = volume("a volume of cells' values")
-values = vtk.vtkFloatArray()
-for i in range(data.GetNumberOfCells()):
-    values.InsertNextValue(i)
-data.GetCellData().SetScalars(values)
-data.GetPointData().SetScalars(None)
 
 light = vtk.vtkLight()
 light.SetLightTypeToSceneLight()
