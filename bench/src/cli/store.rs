@@ -137,6 +137,12 @@ fn store_file(
             job.add(&piece?)?;
             bar.set_position(pieces.faces_read());
         }
+        if job.keeps_attributes() && pieces.normals_left_out() > 0 {
+            let count = pieces.normals_left_out();
+            job.warn_once(format!(
+                "normals of {count} vertices are not stored: others near them have none"
+            ));
+        }
         if pieces.fanned() > 0 {
             let count = pieces.fanned();
             job.warn_once(format!(

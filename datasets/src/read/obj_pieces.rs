@@ -46,6 +46,7 @@ pub struct ObjPieces {
     read: u64,
     before: [usize; 2],
     fanned: u64,
+    normals_left_out: u64,
     piece: usize,
 }
 
@@ -137,6 +138,7 @@ impl ObjPieces {
             read: 0,
             before: [0; 2],
             fanned: 0,
+            normals_left_out: 0,
             piece: piece.max(1),
         };
         pieces.read_vertices()?;
@@ -193,6 +195,11 @@ impl ObjPieces {
         self.fanned
     }
 
+    /// Vertices whose normals were left out so far, because others of their piece have none.
+    pub fn normals_left_out(&self) -> u64 {
+        self.normals_left_out
+    }
+
     /// What is left out.
     pub fn contents(&self) -> ObjContents {
         self.contents
@@ -225,6 +232,10 @@ impl ObjPieces {
                 }
                 _ => {}
             }
+        }
+        let with_normal = part.vertices.iter().filter(|[_, normal]| *normal != u32::MAX).count();
+        if with_normal < part.vertices.len() {
+            self.normals_left_out += with_normal as u64;
         }
         Ok(self.mesh(part))
     }
@@ -398,8 +409,11 @@ mod tests {
         assert!(pieces.next().unwrap().unwrap().normals.is_none());
         assert_eq!(pieces.next().unwrap().unwrap().num_triangles(), 0);
         assert!(pieces.next().is_none());
-        let pieces: Vec<_> = ObjPieces::open(&path, 9).unwrap().map(Result::unwrap).collect();
+        assert_eq!(pieces.normals_left_out(), 0);
+        let mut whole = ObjPieces::open(&path, 9).unwrap();
+        let pieces: Vec<_> = whole.by_ref().map(Result::unwrap).collect();
         assert!(pieces.len() == 1 && pieces[0].normals.is_none());
+        assert_eq!(whole.normals_left_out(), 3);
     }
 
     #[test]
