@@ -116,18 +116,23 @@ def members(found):
     return folders
 
 
-def workspace_manifest(text, folders):
-    """The workspace's manifest with these members alone."""
+def packages_needed():
+    """Names of all packages that the library is built from, or with."""
+    listed = cargo("tree", "-p", MEMBER, "--edges", "normal,build", "--prefix", "none", "--format", "{p}", text=True)
+    return {line.split()[0] for line in listed.splitlines() if line}
+
+
+def workspace_manifest(text, folders, needed):
+    """The workspace's manifest with these members alone, and the profiles of the packages needed."""
     names = "".join(f'    "{folder}",\n' for folder in folders)
     text, count = re.subn(r"(?m)^members = \[[^\]]*\]", f"members = [\n{names}]", text)
     if count != 1:
         raise SystemExit("the workspace's Cargo.toml has no list of members that can be shortened")
     text = re.sub(r"(?m)^exclude = \[[^\]]*\]\n", "", text)
-    # Profiles of members that are not here would be warned about.
-    there = {pathlib.PurePath(folder).name for folder in folders}
+    # Profiles of packages that are not here would be warned about.
 
     def kept(section):
-        return section[0] if section[1] in there else ""
+        return section[0] if section[1] in needed else ""
 
     return re.sub(r"(?m)^\[profile\.dev\.package\.([\w-]+)\]\n(?:[^\[\n].*\n|\n)*", kept, text)
 
@@ -147,7 +152,7 @@ def rust_sources():
             if path and file.is_file() and path != "Cargo.lock" and not path.startswith("python/"):
                 files[f"{inside}/{path}"] = file.read_bytes()
     manifest = (root / "Cargo.toml").read_text()
-    files["Cargo.toml"] = workspace_manifest(manifest, folders).encode()
+    files["Cargo.toml"] = workspace_manifest(manifest, folders, packages_needed()).encode()
     files["Cargo.lock"] = (root / "Cargo.lock").read_bytes()
     return files
 
