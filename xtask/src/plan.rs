@@ -16,6 +16,13 @@ const fn cargo(args: &'static [&'static str]) -> Action {
 /// mostly waits for the network and the disk.
 pub(crate) const PEERS: &str = "peers";
 
+/// The last step that all later ones wait for.
+pub(crate) const TESTS: &str = "tests";
+
+/// Steps that run beside those that follow [`TESTS`]: they compile, and the others mostly wait for
+/// programs that they start.
+pub(crate) const BESIDE: &[&str] = &["book-and-doc-tests", "counters", "api-docs"];
+
 /// All steps, in execution order.
 pub(crate) const STEPS: &[Step] = &[
     Step {
@@ -123,7 +130,7 @@ pub(crate) const STEPS: &[Step] = &[
         action: cargo(&["test", "--workspace", "--no-run"]),
     },
     Step {
-        name: "tests",
+        name: TESTS,
         tells: "unit and integration tests of all members pass, with the peers that were found",
         action: Action::Call(test_programs::run),
     },
@@ -148,7 +155,17 @@ pub(crate) const STEPS: &[Step] = &[
         name: "counters",
         tells: "rt-core's unit tests also pass with the counters of the traversal loops compiled \
                 in",
-        action: cargo(&["test", "-p", "rt-core", "--features", "stats", "--lib"]),
+        // Counters do not need all optimisations, which take longer than the tests.
+        action: cargo(&[
+            "test",
+            "-p",
+            "rt-core",
+            "--features",
+            "stats",
+            "--lib",
+            "--config",
+            "profile.dev.package.rt-core.opt-level=1",
+        ]),
     },
     Step {
         name: "api-docs",
@@ -188,6 +205,15 @@ mod tests {
                 let line = args.join(" ");
                 assert!(builds_only.iter().any(|b| line.starts_with(b)), "{}: {line}", step.name);
             }
+        }
+    }
+
+    #[test]
+    fn what_runs_beside_the_last_steps_comes_after_the_tests_and_only_calls_cargo() {
+        let place = |name: &str| STEPS.iter().position(|s| s.name == name).expect("a step");
+        for name in BESIDE {
+            assert!(place(name) > place(TESTS), "{name}");
+            assert!(matches!(STEPS[place(name)].action, Action::Cargo { .. }), "{name}");
         }
     }
 

@@ -1,11 +1,12 @@
 //! Runs the steps, prints every command before it runs, and prints the cost of all at the end.
 
-use std::ops::Range;
+use std::io::Write as _;
 use std::path::Path;
+use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 use crate::peers::{self, Install, Peers};
-use crate::plan::{PEERS, STEPS};
+use crate::plan::{BESIDE, PEERS, STEPS, TESTS};
 use crate::step::{Action, Context, Outcome, Step};
 use crate::{Exit, TestOptions, systems};
 
@@ -18,8 +19,8 @@ pub(crate) fn run(root: &Path, options: &TestOptions) -> Exit {
         .collect();
 
     let started = Instant::now();
-    let mut run = Run { chosen: &chosen, report: vec![], exit: None };
-    let early = chosen.iter().take_while(|s| runs_beside_set_up(s)).count();
+    let run = Run { count: chosen.len(), report: Mutex::default() };
+    let first = number_of_steps_until(&chosen, |s| s.name == PEERS);
     let peers = std::thread::scope(|scope| {
         let set_up = scope.spawn(|| {
             let set_up = (peers::set_up(root, install), started.elapsed());
@@ -28,61 +29,120 @@ pub(crate) fn run(root: &Path, options: &TestOptions) -> Exit {
             }
             set_up
         });
-        run.steps(0..early, &Context { root, options, peers: &Peers::default() });
+        run.steps(&chosen[..first], &Context { root, options, peers: &Peers::default() });
         match set_up.join() {
             Ok((peers, took)) => {
-                run.report.push(("set-up", Outcome::Passed, took.as_secs_f64()));
+                run.add("set-up", Outcome::Passed, took.as_secs_f64());
                 peers
             }
             Err(panic) => std::panic::resume_unwind(panic),
         }
     });
-    run.steps(early..chosen.len(), &Context { root, options, peers: &peers });
-    let Run { report, exit, .. } = run;
+    let context = Context { root, options, peers: &peers };
+    let after_tests = |s: &Step| comes_after(s, TESTS);
+    let second = number_of_steps_until(&chosen, after_tests);
+    run.steps(&chosen[first..second], &context);
+    let (beside, last): (Vec<&Step>, Vec<&Step>) =
+        chosen[second..].iter().partition(|s| BESIDE.contains(&s.name));
+    std::thread::scope(|scope| {
+        scope.spawn(|| run.steps_in_silence(&beside, &context));
+        run.steps(&last, &context);
+    });
+    let report = run.report.into_inner().unwrap_or_else(PoisonError::into_inner);
     let left = chosen.len() + 1 - report.len();
     print!("{}", summary(&report, left, started.elapsed().as_secs_f64()));
     print!("{}", peers.describe());
-    exit.unwrap_or(Exit::Success)
+    report.iter().find_map(|(_, outcome, _)| exit_of(outcome)).unwrap_or(Exit::Success)
 }
 
-/// Whether a step needs no peers: those before [`PEERS`].
-fn runs_beside_set_up(step: &Step) -> bool {
-    STEPS.iter().take_while(|s| s.name != PEERS).any(|s| s.name == step.name)
+/// How many of the steps come before the first that `ends` is true for, or that a later step of the
+/// plan is.
+fn number_of_steps_until(chosen: &[&Step], ends: impl Fn(&Step) -> bool) -> usize {
+    let end = STEPS.iter().position(ends).unwrap_or(STEPS.len());
+    chosen.iter().take_while(|s| STEPS[..end].iter().any(|e| e.name == s.name)).count()
+}
+
+/// Whether a step comes after the one with this name.
+fn comes_after(step: &Step, name: &str) -> bool {
+    STEPS.iter().skip_while(|s| s.name != name).skip(1).any(|s| s.name == step.name)
+}
+
+/// The exit status that a step's end asks for; `None` for the run to go on.
+fn exit_of(outcome: &Outcome) -> Option<Exit> {
+    match outcome {
+        Outcome::Failed(_) => Some(Exit::StepFailed),
+        Outcome::PeerMissing(_) => Some(Exit::PeerMissing),
+        Outcome::Passed | Outcome::NotRun(_) => None,
+    }
 }
 
 /// What has run so far.
-struct Run<'a> {
-    chosen: &'a [&'a Step],
-    report: Vec<(&'static str, Outcome, f64)>,
-    exit: Option<Exit>,
+struct Run {
+    /// Steps that were chosen.
+    count: usize,
+    report: Mutex<Vec<(&'static str, Outcome, f64)>>,
 }
 
-impl Run<'_> {
-    /// Runs some of the chosen steps, until one fails.
-    fn steps(&mut self, range: Range<usize>, context: &Context<'_>) {
-        for i in range {
-            if self.exit.is_some() {
+impl Run {
+    fn add(&self, name: &'static str, outcome: Outcome, secs: f64) {
+        let mut report = self.report.lock().unwrap_or_else(PoisonError::into_inner);
+        report.push((name, outcome, secs));
+    }
+
+    /// Whether a step has failed. None is begun after it.
+    fn is_over(&self) -> bool {
+        let report = self.report.lock().unwrap_or_else(PoisonError::into_inner);
+        report.iter().any(|(_, outcome, _)| exit_of(outcome).is_some())
+    }
+
+    /// Runs steps one after the other, until one fails.
+    fn steps(&self, steps: &[&Step], context: &Context<'_>) {
+        for step in steps {
+            if self.is_over() {
                 return;
             }
-            let step = self.chosen[i];
-            let (number, action) = (i + 1, describe(&step.action));
-            println!("\n==> [{number}/{}] {}: {action}", self.chosen.len(), step.name);
+            println!("\n{}", self.title(step));
             let begun = Instant::now();
             let outcome = match &step.action {
                 Action::Call(f) => f(context),
                 Action::Cargo { args, env } => context.cargo(args, env),
             };
-            self.exit = match &outcome {
-                Outcome::Failed(_) => Some(Exit::StepFailed),
-                Outcome::PeerMissing(_) => Some(Exit::PeerMissing),
-                Outcome::NotRun(why) => {
-                    println!("not run: {why}");
-                    None
-                }
-                Outcome::Passed => None,
-            };
-            self.report.push((step.name, outcome, begun.elapsed().as_secs_f64()));
+            if let Outcome::NotRun(why) = &outcome {
+                println!("not run: {why}");
+            }
+            self.add(step.name, outcome, begun.elapsed().as_secs_f64());
         }
+    }
+
+    /// [`Run::steps`] of steps that call cargo, beside others: what a step prints comes in one
+    /// piece when it has ended.
+    fn steps_in_silence(&self, steps: &[&Step], context: &Context<'_>) {
+        for step in steps {
+            if self.is_over() {
+                return;
+            }
+            let Action::Cargo { args, env } = &step.action else { continue };
+            let begun = Instant::now();
+            let (outcome, said) = context.cargo_in_silence(args, env);
+            let secs = begun.elapsed().as_secs_f64();
+            let mut out = std::io::stdout().lock();
+            // What cannot be printed is no fault of the step.
+            let _ = writeln!(out, "\n{}, {secs:.1} s beside others", self.title(step));
+            let _ = out.write_all(&said).and_then(|()| out.flush());
+            drop(out);
+            self.add(step.name, outcome, secs);
+        }
+    }
+
+    /// The line above what a step prints.
+    fn title(&self, step: &Step) -> String {
+        let number = STEPS.iter().position(|s| s.name == step.name).unwrap_or(0) + 1;
+        let of = if self.count == STEPS.len() {
+            format!("[{number}/{}] ", self.count)
+        } else {
+            String::new()
+        };
+        format!("==> {of}{}: {}", step.name, describe(&step.action))
     }
 }
 
@@ -123,6 +183,29 @@ fn summary(report: &[(&str, Outcome, f64)], left: usize, total_secs: f64) -> Str
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn steps_are_divided_by_the_plan_also_where_few_are_chosen() {
+        let of = |names: &[&str]| -> Vec<&Step> {
+            STEPS.iter().filter(|s| names.contains(&s.name)).collect()
+        };
+        let until_tests =
+            |chosen: &[&Step]| number_of_steps_until(chosen, |s| comes_after(s, TESTS));
+        let all: Vec<&Step> = STEPS.iter().collect();
+        assert_eq!(all[until_tests(&all) - 1].name, TESTS);
+        assert_eq!(until_tests(&of(&["fmt", TESTS, "main-job"])), 2);
+        assert_eq!(until_tests(&of(&["main-job", "counters"])), 0);
+        assert_eq!(number_of_steps_until(&of(&["fmt", TESTS]), |s| s.name == PEERS), 1);
+    }
+
+    #[test]
+    fn a_step_that_fails_ends_the_run_of_both_lanes() {
+        let run = Run { count: 1, report: Mutex::default() };
+        run.add("fmt", Outcome::NotRun("why".to_owned()), 0.1);
+        assert!(!run.is_over());
+        run.add("wheels", Outcome::Failed("exit status: 1".to_owned()), 0.1);
+        assert!(run.is_over());
+    }
 
     #[test]
     fn the_summary_names_what_failed_and_what_was_not_reached() {

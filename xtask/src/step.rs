@@ -3,7 +3,7 @@
 use crate::TestOptions;
 use crate::peers::Peers;
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, ExitStatus, Stdio};
 
 /// One check.
 #[derive(Debug)]
@@ -58,13 +58,34 @@ pub(crate) enum Outcome {
 impl Context<'_> {
     /// Runs cargo in the root with the peers' variables set.
     pub(crate) fn cargo(&self, args: &[&str], env: &[(&str, &str)]) -> Outcome {
+        outcome(self.command(args, env).status())
+    }
+
+    /// [`Context::cargo`], and what it printed instead of printing it.
+    pub(crate) fn cargo_in_silence(
+        &self,
+        args: &[&str],
+        env: &[(&str, &str)],
+    ) -> (Outcome, Vec<u8>) {
+        match self.command(args, env).stdin(Stdio::null()).output() {
+            Ok(output) => (outcome(Ok(output.status)), [output.stdout, output.stderr].concat()),
+            Err(e) => (outcome(Err(e)), Vec::new()),
+        }
+    }
+
+    fn command(&self, args: &[&str], env: &[(&str, &str)]) -> Command {
         let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
         command.args(args).current_dir(self.root).envs(env.iter().copied());
         command.envs(self.peers.environment(self.options.require_peers));
-        match command.status() {
-            Ok(status) if status.success() => Outcome::Passed,
-            Ok(status) => Outcome::Failed(status.to_string()),
-            Err(e) => Outcome::Failed(format!("cargo does not start: {e}")),
-        }
+        command
+    }
+}
+
+/// How a step ended that ran cargo.
+fn outcome(ended: std::io::Result<ExitStatus>) -> Outcome {
+    match ended {
+        Ok(status) if status.success() => Outcome::Passed,
+        Ok(status) => Outcome::Failed(status.to_string()),
+        Err(e) => Outcome::Failed(format!("cargo does not start: {e}")),
     }
 }
