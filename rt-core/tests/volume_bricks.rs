@@ -6,7 +6,7 @@ use rt_core::grid::Grid;
 use rt_core::ray::Ray;
 use rt_core::transfer_function::TransferFunction;
 use rt_core::volume::{
-    Brick, GridExtent, Interpolation, PartialIntegral, RaySegments, Volume, VolumeError,
+    Brick, Cropping, GridExtent, Interpolation, PartialIntegral, RaySegments, Volume, VolumeError,
     VolumeOptions, VolumeQuality, VolumeSample, VolumeShading,
 };
 
@@ -78,10 +78,13 @@ fn rays_through_bricks_have_the_bits_of_rays_through_the_whole() {
         (state >> 40) as f32 / (1u64 << 24) as f32
     };
     let (mut met, mut through_three) = (0, 0);
+    let size = SPACING * (DIMS - UVec3::ONE).as_dvec3();
+    // A fence, which leaves up to three parts of a ray.
+    let fence = Some(Cropping { planes: [0.3 * size, 0.7 * size], regions: 0x2eb_feba });
     for interpolation in [Interpolation::Linear, Interpolation::Nearest] {
-        for shading in [None, Some(shading)] {
-            let whole =
-                volume(VolumeOptions { shading, interpolation, ..VolumeOptions::default() });
+        for (shading, cropping) in [(None, None), (Some(shading), None), (None, fence)] {
+            let options = VolumeOptions { shading, interpolation, ..VolumeOptions::default() };
+            let whole = volume(VolumeOptions { cropping, ..options });
             let bricks = bricks(whole.blocks());
             let parts: Vec<Volume> = bricks.iter().map(|b| whole.part(*b)).collect();
             let most = parts.iter().map(|p| p.grid().values().len()).max().unwrap();

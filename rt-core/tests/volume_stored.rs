@@ -10,8 +10,8 @@ use rt_core::render::{RenderError, render};
 use rt_core::stored_volume::{StoredVolume, StoredVolumeWriter, ValueType, VolumeLayout};
 use rt_core::transfer_function::TransferFunction;
 use rt_core::volume::{
-    Blend, Brick, GradientOpacity, Interpolation, Volume, VolumeError, VolumeLight, VolumeOptions,
-    VolumeQuality, VolumeSample, VolumeShading, integrate_overlapping,
+    Blend, Brick, ClipPlane, Cropping, GradientOpacity, Interpolation, Volume, VolumeError,
+    VolumeLight, VolumeOptions, VolumeQuality, VolumeSample, VolumeShading, integrate_overlapping,
 };
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -102,6 +102,9 @@ fn looks() -> Vec<VolumeOptions> {
     let light = VolumeLight { direction: Some(Vec3::new(1.0, 2.0, 0.5)), color: [1.0, 0.5, 0.2] };
     let factors = vec![0.0, 0.5, 1.0].into();
     let surfaces = Blend::Isosurfaces(vec![0.3, 0.7].into());
+    let size = layout().spacing * (DIMS - UVec3::ONE).as_dvec3();
+    let cropping = |regions| Cropping { planes: [0.3 * size, 0.8 * size], regions };
+    let clip_planes = vec![ClipPlane { point: 0.5 * size, normal: DVec3::new(1.0, 0.4, -0.3) }];
     let plain = VolumeOptions::default;
     let mut all = vec![
         plain(),
@@ -114,6 +117,8 @@ fn looks() -> Vec<VolumeOptions> {
             ..plain()
         },
         VolumeOptions { shading: Some(shading), blend: surfaces, ..plain() },
+        VolumeOptions { cropping: Some(cropping(0x2eb_feba)), ..plain() },
+        VolumeOptions { cropping: Some(cropping(Cropping::BOX)), clip_planes, ..plain() },
     ];
     let blends = [Blend::Maximum, Blend::Minimum, Blend::Average, Blend::Additive];
     for interpolation in [Interpolation::Linear, Interpolation::Nearest] {

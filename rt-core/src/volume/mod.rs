@@ -353,14 +353,18 @@ impl Volume {
         if self.takes_samples() {
             return self.sample_ray(ray, t0 as f32, t1 as f32);
         }
-        let mut collected = PartialIntegral::default();
         let (o, d) = (ray.origin.as_dvec3(), ray.dir.as_dvec3());
-        for [t0, t1] in self.options.cropped(o, d, [t0, t1]).as_slice() {
-            if !collected.is_opaque(quality) {
-                collected = self.march(ray, *t0, *t1, quality, &collected).into();
+        let nothing = PartialIntegral::default();
+        match self.options.cropped(o, d, [t0, t1]).as_slice() {
+            [] => VolumeSample::CLEAR,
+            [[t0, t1]] => {
+                PartialIntegral::from(self.march(ray, *t0, *t1, quality, &nothing)).sample()
             }
+            // With the tolerance shared as among the holders of parts.
+            _ => RaySegments::new(vec![(self, *ray)], t0 as f32, t1 as f32)
+                .integrate_spans(0..usize::MAX, quality, nothing)
+                .sample(),
         }
-        collected.sample()
     }
 
     /// Whether cells are boxes around the points of the grid instead of between them.
