@@ -2,11 +2,12 @@
 
 use std::io::Write as _;
 use std::path::Path;
+use std::sync::mpsc::{self, Sender};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 use crate::peers::{self, Install, Peers};
-use crate::plan::{BESIDE, PEERS, STEPS, TESTS};
+use crate::plan::{BESIDE, MAIN_JOB, PEERS, STEPS, TESTS, WHEELS};
 use crate::step::{Action, Context, Outcome, Step};
 use crate::{Exit, TestOptions, systems};
 
@@ -44,9 +45,19 @@ pub(crate) fn run(root: &Path, options: &TestOptions) -> Exit {
     run.steps(&chosen[first..second], &context);
     let (beside, last): (Vec<&Step>, Vec<&Step>) =
         chosen[second..].iter().partition(|s| BESIDE.contains(&s.name));
+    let beside = ordered(beside);
     std::thread::scope(|scope| {
-        scope.spawn(|| run.steps_in_silence(&beside, &context));
-        run.steps(&last, &context);
+        let (tell, told) = mpsc::channel();
+        let (run, context) = (&run, &context);
+        scope.spawn(move || run.steps_beside(&beside, context, &tell));
+        let (before, main_job): (Vec<&Step>, Vec<&Step>) =
+            last.iter().partition(|s| s.name != MAIN_JOB);
+        run.steps(&before, context);
+        if !main_job.is_empty() {
+            // Ends without the wheels where they are not among the steps, or one has failed.
+            told.iter().find(|name| *name == WHEELS);
+        }
+        run.steps(&main_job, context);
     });
     let report = run.report.into_inner().unwrap_or_else(PoisonError::into_inner);
     let left = chosen.len() + 1 - report.len();
@@ -60,6 +71,12 @@ pub(crate) fn run(root: &Path, options: &TestOptions) -> Exit {
 fn number_of_steps_until(chosen: &[&Step], ends: impl Fn(&Step) -> bool) -> usize {
     let end = STEPS.iter().position(ends).unwrap_or(STEPS.len());
     chosen.iter().take_while(|s| STEPS[..end].iter().any(|e| e.name == s.name)).count()
+}
+
+/// Steps in the order of [`BESIDE`].
+fn ordered(mut steps: Vec<&Step>) -> Vec<&Step> {
+    steps.sort_by_key(|s| BESIDE.iter().position(|name| *name == s.name));
+    steps
 }
 
 /// Whether a step comes after the one with this name.
@@ -114,23 +131,27 @@ impl Run {
         }
     }
 
-    /// [`Run::steps`] of steps that call cargo, beside others: what a step prints comes in one
-    /// piece when it has ended.
-    fn steps_in_silence(&self, steps: &[&Step], context: &Context<'_>) {
+    /// [`Run::steps`] beside others: what cargo prints comes in one piece when it has ended. Tells
+    /// the names of steps that have.
+    fn steps_beside(&self, steps: &[&Step], context: &Context<'_>, tell: &Sender<&'static str>) {
         for step in steps {
             if self.is_over() {
                 return;
             }
-            let Action::Cargo { args, env } = &step.action else { continue };
-            let begun = Instant::now();
-            let (outcome, said) = context.cargo_in_silence(args, env);
-            let secs = begun.elapsed().as_secs_f64();
-            let mut out = std::io::stdout().lock();
-            // What cannot be printed is no fault of the step.
-            let _ = writeln!(out, "\n{}, {secs:.1} s beside others", self.title(step));
-            let _ = out.write_all(&said).and_then(|()| out.flush());
-            drop(out);
-            self.add(step.name, outcome, secs);
+            if let Action::Cargo { args, env } = &step.action {
+                let begun = Instant::now();
+                let (outcome, said) = context.cargo_in_silence(args, env);
+                let secs = begun.elapsed().as_secs_f64();
+                let mut out = std::io::stdout().lock();
+                // What cannot be printed is no fault of the step.
+                let _ = writeln!(out, "\n{}, {secs:.1} s beside others", self.title(step));
+                let _ = out.write_all(&said).and_then(|()| out.flush());
+                self.add(step.name, outcome, secs);
+            } else {
+                self.steps(&[step], context);
+            }
+            // Nobody may wait for it.
+            let _ = tell.send(step.name);
         }
     }
 
