@@ -418,7 +418,7 @@ fn a_volume_that_c_describes_goes_to_whoever_is_cheaper() {
         |_, v| v.sample_distance = 0.5,
         // Not traced, or not as OpenGL samples it.
         |f, _| f.num_components = 3,
-        |f, _| f.cropping = 1,
+        |f, _| f.mask = 1,
         |f, _| f.blend_mode = RTV_BLEND_MAXIMUM,
         |_, v| v.sample_distance = 0.0,
         // Faults of the caller.

@@ -391,6 +391,6 @@ fn what_nothing_speaks_against_is_traced() {
 fn the_first_of_several_reasons_is_given() {
     let facts = RtvActorFacts { shader_code: 1, vertex_visibility: 1, no_data: 1, ..ACTOR };
     assert_eq!(of_actor(&facts), Some("vertices on the surface"));
-    let facts = RtvVolumeFacts { cropping: 1, image: 0, ..VOLUME };
-    assert_eq!(of_volume(&facts), Some("a cropped volume"));
+    let facts = RtvVolumeFacts { mask: 1, image: 0, ..VOLUME };
+    assert_eq!(of_volume(&facts), Some("a volume with a mask"));
 }
