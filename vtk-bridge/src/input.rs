@@ -411,8 +411,8 @@ pub struct Volume<'a> {
     pub cropping: Option<Cropping>,
     /// Half-spaces that are drawn: for each a point of the plane and its normal, in the world.
     pub clip_planes: &'a [[f64; 6]],
-    /// Cropping planes are where OpenGL's mapper has them: its shader compares them with coordinates
-    /// of texels, in which a grid of n points is n wide, and not n - 1.
+    /// Cropping planes are where OpenGL's mapper has them: its shader compares them with
+    /// coordinates of texels, in which a grid of n points is n wide, and not n - 1.
     pub cropping_in_texels: bool,
     /// So are clipping planes, as in OpenGL's mapper before VTK 9.3.
     pub clipping_in_texels: bool,
