@@ -261,7 +261,7 @@ void ReadMatrix(vtkVolume* volume, vtkImageData* image, vtkMatrix4x4* world)
 void ReadRegion(vtkVolumeMapper* mapper, vtkImageData* image, RtvVolume& v, std::vector<double>& planes)
 {
   v.cropping_in_texels = mapper->IsA("vtkFixedPointVolumeRayCastMapper") ? 0 : 1;
-#if VTK_VERSION_NUMBER < VTK_VERSION_CHECK(9, 3, 0)
+#if VTK_VERSION_NUMBER < VTK_VERSION_CHECK(9, 3, 1)
   v.clipping_in_texels = v.cropping_in_texels;
 #endif
   if (mapper->GetCropping())

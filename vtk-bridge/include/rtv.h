@@ -271,7 +271,7 @@ typedef struct RtvVolume {
   RtvArray clip_planes;
   /* 1: cropping planes are where OpenGL's mapper has them, which takes the grid for half a cell larger on each side, unless the scalars are those of cells. */
   uint32_t cropping_in_texels;
-  /* 1: so are clipping planes, as before VTK 9.3. */
+  /* 1: so are clipping planes, as before VTK 9.3.1. */
   uint32_t clipping_in_texels;
 } RtvVolume;
 /* A light that is on. */

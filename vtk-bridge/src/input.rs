@@ -414,7 +414,7 @@ pub struct Volume<'a> {
     /// Cropping planes are where OpenGL's mapper has them: its shader compares them with
     /// coordinates of texels, in which a grid of n points is n wide, and not n - 1.
     pub cropping_in_texels: bool,
-    /// So are clipping planes, as in OpenGL's mapper before VTK 9.3.
+    /// So are clipping planes, as in OpenGL's mapper before VTK 9.3.1.
     pub clipping_in_texels: bool,
 }
 

@@ -296,7 +296,7 @@ pub struct RtvVolume {
     /// 1: cropping planes are where OpenGL's mapper has them, which takes the grid for half a cell
     /// larger on each side, unless the scalars are those of cells.
     pub cropping_in_texels: u32,
-    /// 1: so are clipping planes, as before VTK 9.3.
+    /// 1: so are clipping planes, as before VTK 9.3.1.
     pub clipping_in_texels: u32,
 }
 
