@@ -262,6 +262,7 @@ fn volume_rows(r: &mut Rows) {
         |f| (f.cropping, f.cropping_regions, f.blend_mode) = (1, 7, RTV_BLEND_ADDITIVE),
         "a volume cropped to more than a box, with another blending than composite",
     );
+    r.volume(|f| (f.cropping, f.cropping_regions) = (1, 0), "a volume cropped to no region");
     r.volume(|f| (f.cropping, f.turned) = (1, 1), "a cropped volume with turned axes");
     r.volume(|f| f.mask = 1, "a volume with a mask");
     r.volume(|f| f.scattering = 1, "a volume with shadows or scattering of its own");

@@ -41,6 +41,8 @@ pub(in crate::capi) fn volume(
     first(&[
         (!VOLUMES.contains(&volume_class), "OpenGL draws volumes of this class"),
         (!VOLUME_MAPPERS.contains(&mapper_class), "OpenGL draws volume mappers of this class"),
+        // Nothing is drawn of it; no region in RtvVolume means all of them.
+        (f.cropping != 0 && f.cropping_regions == 0, "a volume cropped to no region"),
         (
             f.cropping != 0
                 && f.cropping_regions != Cropping::BOX
