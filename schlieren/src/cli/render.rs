@@ -150,7 +150,7 @@ pub(super) struct RenderSummary {
 }
 
 /// Reads the flow, renders it and writes the files.
-pub(super) fn render_and_write(
+fn render_and_write(
     common: CommonArgs,
     cancel: Cancel,
     scene: &Scene,
@@ -159,6 +159,17 @@ pub(super) fn render_and_write(
     let start = Instant::now();
     let mut section = TestSection::open(scene, |what| common.note(0, what))?;
     let read_secs = start.elapsed().as_secs_f64();
+    draw_and_write(common, cancel, (scene, &mut section, read_secs), outputs)
+}
+
+/// Renders a flow for which an image has waited `read_secs`, and writes the files.
+pub(super) fn draw_and_write(
+    common: CommonArgs,
+    cancel: Cancel,
+    (scene, section, read_secs): (&Scene, &mut TestSection, f64),
+    outputs: &Outputs<'_>,
+) -> anyhow::Result<RenderSummary> {
+    let start = Instant::now();
     cancel.check()?;
 
     let layers = Layers {
@@ -176,24 +187,25 @@ pub(super) fn render_and_write(
     let rendered = {
         let progress = |part: f64| bar.set_position((1000.0 * part) as u64);
         let control = Control { cancel: cancel.flag(), progress: &progress };
-        match crate::render::render(scene, &section, layers, &control) {
+        match crate::render::render(scene, section, layers, &control) {
             Err(RenderError::Cancelled) => return Err(Interrupted.into()),
             other => other?,
         }
     };
     drop(bar);
-    let render_secs = start.elapsed().as_secs_f64() - read_secs;
+    let render_secs = start.elapsed().as_secs_f64();
     if let Some(path) = outputs.reference {
         let flow = section.take_flow()?;
         let control = Control { cancel: cancel.flag(), ..Control::default() };
-        let background = crate::render::render(scene, &section, Layers::NONE, &control);
+        let background = crate::render::render(scene, section, Layers::NONE, &control);
         (section.fields, section.cells) = flow;
         match background {
             Err(RenderError::Cancelled) => return Err(Interrupted.into()),
             other => output::write_png(path, &other?)?,
         };
     }
-    let overlay_scale = write(outputs, scene, &rendered, start.elapsed().as_secs_f64())?;
+    let elapsed_secs = read_secs + start.elapsed().as_secs_f64();
+    let overlay_scale = write(outputs, scene, &rendered, elapsed_secs)?;
     for w in &rendered.report.warnings {
         common.warn(in_options(w));
     }
@@ -204,7 +216,7 @@ pub(super) fn render_and_write(
         "size": scene.film.size,
         "pixel_m": r.pixel_m,
         "grid": section.grid(),
-        "cells": cells_json(&section, &rendered),
+        "cells": cells_json(section, &rendered),
         "n0_minus_1": section.input.as_ref().map(|i| i.reference_n_minus_1),
         "index_formula": section.input.as_ref().map(|i| i.formula),
         "march": r.march,

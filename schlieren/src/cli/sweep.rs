@@ -1,13 +1,15 @@
 //! Implements `schlieren sweep`: renders a time series, or one flow for several values of a key of
 //! its scene.
 
-use super::render::{Outputs, render_and_write};
+use super::render::{Outputs, draw_and_write};
 use super::scene_args::SceneArgs;
+use crate::render::ReadAhead;
 use crate::scene::Scene;
 use clap::Args;
 use datasets::cli::{Cancel, CommonArgs, UsageError};
 use serde_json::json;
 use std::path::PathBuf;
+use std::time::Instant;
 
 /// Options of `schlieren sweep`.
 #[derive(Debug, Args)]
@@ -99,19 +101,34 @@ pub(super) fn sweep(common: CommonArgs, args: &SweepArgs) -> anyhow::Result<()> 
         }
     }
 
+    let is_series = args.set.is_none();
     let mut reference: Option<f64> = None;
-    for (i, (label, mut scene)) in runs.into_iter().enumerate() {
-        cancel.check()?;
-        // All times are relative to the surroundings of the first one, so that the images are
-        // comparable.
-        if args.set.is_none() && scene.flow.reference_n_minus_1.is_none() {
+    // All times are relative to the surroundings of the first one, so that the images are
+    // comparable.
+    let relative = |scene: &Scene, reference: Option<f64>| {
+        let mut scene = scene.clone();
+        if is_series && scene.flow.reference_n_minus_1.is_none() {
             scene.flow.reference_n_minus_1 = reference;
         }
+        scene
+    };
+    let mut sections = ReadAhead::default();
+    for (i, (label, scene)) in runs.iter().enumerate() {
+        cancel.check()?;
         let numbered = |p: &Option<PathBuf>| p.as_ref().map(|p| number(p, i));
         let (png, exr, npy) = (numbered(&args.out), numbered(&args.exr), numbered(&args.npy));
         let outputs = Outputs::new(png.as_deref(), exr.as_deref(), npy.as_deref())?;
-        let summary = render_and_write(common, cancel, &scene, &outputs)?;
-        reference = reference.or(summary.json["n0_minus_1"].as_f64());
+        let scene = relative(scene, reference);
+        let start = Instant::now();
+        let mut section = sections.open(&scene, |what| common.note(0, what))?;
+        let read_secs = start.elapsed().as_secs_f64();
+        reference = reference.or(section.input.as_ref().map(|i| i.reference_n_minus_1));
+        if let Some((_, next)) = runs.get(i + 1) {
+            sections.begin(&relative(next, reference), &scene, &section);
+        }
+        let drawn = (&scene, &mut section, read_secs);
+        let summary = draw_and_write(common, cancel, drawn, &outputs)?;
+        sections.give_back(&scene, section);
         let mut object = summary.json;
         if let Some(map) = object.as_object_mut() {
             map.insert("index".into(), i.into());

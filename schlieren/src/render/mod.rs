@@ -36,6 +36,7 @@ mod on_cells;
 mod on_gpu;
 mod paths;
 mod planned;
+mod read_ahead;
 mod section;
 #[cfg(test)]
 mod tests;
@@ -47,6 +48,7 @@ pub use media::MediaMap;
 pub use on_gpu::check_gpu;
 pub use paths::{INTERPOLANTS, MARCHES};
 pub use planned::PlannedPaths;
+pub use read_ahead::ReadAhead;
 pub use section::TestSection;
 
 use crate::cutoff::Rgb;

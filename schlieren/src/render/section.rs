@@ -8,7 +8,8 @@ use crate::gas_on_cells::GasOnCells;
 use crate::input;
 use crate::march::FieldCache;
 use crate::media::Media;
-use crate::scene::Scene;
+use crate::path::PathQuantities;
+use crate::scene::{Scene, TechniqueSpec};
 use crate::solids::Solids;
 use crate::view::View;
 use datasets::model::Dataset;
@@ -192,6 +193,20 @@ impl TestSection {
     pub fn with_caches(mut self) -> TestSection {
         self.caches = self.fields.iter().map(|_| Caches::default()).collect();
         self
+    }
+
+    /// Computes what the image of a scene will take from the caches of
+    /// [`TestSection::with_caches`]: splines and projections, and the copy on a device. Errors are
+    /// those of the image, so they are left to it.
+    pub fn prepare(&self, scene: &Scene) {
+        if self.caches.is_empty() || !scene.technique.follows_light() {
+            return;
+        }
+        let against_light = matches!(scene.technique, TechniqueSpec::Bos { .. });
+        let opd = matches!(scene.technique, TechniqueSpec::Interferogram { .. });
+        for line in 0..self.caches.len().min(scene.light.wavelengths_nm.len()) {
+            let _ = self.paths(scene, line, PathQuantities { opd }, against_light, false);
+        }
     }
 
     /// Index of the reference medium for a line of the spectrum.
