@@ -160,10 +160,6 @@ fn wrong_usage_exits_with_2_and_names_the_option() {
         (&["--density", "rho", "--tolerance", "1 foot", "-o", &png], "1e-7rad"),
         (&["--density", "rho", "--skip", "1e-9rad", "--march", "euler", "-o", &png], "only verlet"),
         (&["--density", "rho", "--skip=-1", "-o", &png], "--skip is -1"),
-        (
-            &["--density", "rho", "--march", "line-of-sight", "--device", "gpu", "-o", &png],
-            "line-of-sight",
-        ),
         (&["--density", "rho", "--curve", "T=300:0,900:-1e-4", "-o", &png], "alternatives"),
         (&["--density", "rho", "--curve-weight", "T=2", "-o", &png], "--curve-weight"),
         (&["--density", "rho", "--curve-rule", "sum", "-o", &png], "--curve-rule"),

@@ -468,21 +468,24 @@ fn films_agree_with_the_cpu() {
     }
 }
 
+/// Single rays sample the projection on the CPU, so they are its rays bit for bit. Without a named
+/// march, the plan takes straight rays on the device where the tolerance allows it, and bent ones
+/// where it does not.
 #[test]
-fn a_march_without_a_kernel_is_refused_by_name_or_left_to_the_cpu() {
+fn straight_rays_are_those_of_the_cpu_and_follow_from_the_plan() {
     let Some(_) = gpu() else { return };
     let field = cube(9, lopsided);
-    let (rest, word) = ("method = \"line-of-sight\"", "line-of-sight");
-    let e = rendered(&field, "gpu", rest).unwrap_err();
-    assert!(matches!(*e, RenderError::Gpu(GpuError::Unsupported { .. })), "{e:?}");
-    assert!(e.to_string().contains(word), "{e}");
-    let r = rendered(&field, "auto", rest).unwrap();
-    let named = r.report.warnings.iter().any(|w| w.contains("on the CPU") && w.contains(word));
-    assert!(named, "{:?}", r.report);
-    // With a large tolerance the plan would choose line of sight; when the GPU is requested, the
-    // rays are marched.
-    let r = rendered(&field, "gpu", "tolerance_rad = 1e-3").unwrap();
-    assert!(r.report.march.starts_with("verlet"), "{}", r.report.march);
-    let r = rendered(&field, "auto", "tolerance_rad = 1e-3").unwrap();
-    assert!(r.report.march.starts_with("line-of-sight"), "{}", r.report.march);
+    for view in ["", "[view]\ndirection = \"31,-17\"\n"] {
+        let rest = format!("method = \"line-of-sight\"\n{view}");
+        let [a, b] = ["gpu", "cpu"].map(|d| rendered(&field, d, &rest).unwrap());
+        assert!(a.report.march.starts_with("line-of-sight, b-spline, on "), "{}", a.report.march);
+        let [a, b] = [a, b].map(|r| r.map.unwrap());
+        assert_eq!(a.deflection_rad, b.deflection_rad);
+        assert_eq!(a.displacement_m, b.displacement_m);
+    }
+    for (tolerance, march) in [("1e-3", "line-of-sight, b-spline, on "), ("1e-9", "verlet")] {
+        let r = rendered(&field, "gpu", &format!("tolerance_rad = {tolerance}")).unwrap();
+        assert!(r.report.march.starts_with(march), "{tolerance}: {}", r.report.march);
+        assert!(r.report.march.contains(", on "), "{}", r.report.march);
+    }
 }

@@ -169,7 +169,7 @@ fn beams_of_the_device_are_those_of_the_cpu() {
     }
 }
 
-/// Every march and interpolant of the CPU but straight rays, with a technique that reads the path
+/// Every march and interpolant of the CPU, with a technique that reads the path
 /// and one that does not. Steps are no part of a voxel: where stages of a full march lie on faces
 /// of cells, the gradient of trilinear interpolation jumps there, and roundings decide.
 ///
@@ -182,8 +182,8 @@ fn every_march_and_interpolant_exposes_the_frame_of_the_cpu() {
     }
     let field = cube(24, lopsided);
     let interferogram = "[technique]\nkind = \"interferogram\"\n";
-    for march in ["verlet", "euler", "pefrl", "sharma", "rk4"] {
-        let is_full = !["verlet", "euler"].contains(&march);
+    for march in ["verlet", "euler", "pefrl", "sharma", "rk4", "line-of-sight"] {
+        let is_full = !["verlet", "euler", "line-of-sight"].contains(&march);
         for interpolant in ["b-spline", "trilinear", "trilinear-gradient"] {
             for (rest, allowed) in [
                 (format!("{KNIFE}{PHOTONS}{NO_FILTER}"), 2e-5),
@@ -203,6 +203,50 @@ fn every_march_and_interpolant_exposes_the_frame_of_the_cpu() {
             }
         }
     }
+}
+
+/// Straight rays, in every technique: along an axis and obliquely, tilted, against the light, with
+/// bodies on the lattice, and through smoke.
+#[test]
+fn straight_rays_on_the_device_expose_the_frame_of_the_cpu() {
+    if !has_gpu() {
+        return;
+    }
+    let straight = |d: &str, rest: &str| marched(d, "", ["line-of-sight", "b-spline"], rest);
+    let field = cube(24, lopsided);
+    let view = "[view]\ndirection = \"31,-17\"\n";
+    let side = "[view]\ndirection = \"y\"\n";
+    let tilted = "[light]\nbeams = \"tilted\"\n[light.source]\nkind = \"circle\"\ndiameter_m = \
+                  2e-2\n";
+    let photons = format!("{PHOTONS}{NO_FILTER}");
+    for (name, technique) in techniques() {
+        for at in ["", view, side] {
+            for sampling in [&photons, BEAMS] {
+                let rest = format!("{technique}{at}{sampling}");
+                let [gpu, cpu] = ["gpu", "cpu"].map(|d| exposed(&field, &straight(d, &rest)));
+                check_device(&gpu, &cpu, &rest);
+                let [worst, _] = difference(&gpu, &cpu);
+                let changed = changed(&gpu, &cpu, 2e-5);
+                assert!(changed <= 3, "{name}: {rest}: {changed}, {worst:e}");
+                assert!(gpu.report.march.starts_with("line-of-sight, b-spline, on "));
+            }
+        }
+    }
+    for (field, rest) in [
+        (&field, format!("{KNIFE}{tilted}{view}{photons}")),
+        (&device::with_body(24), format!("{KNIFE}{photons}")),
+        (&device::with_body(24), format!("{KNIFE}{view}{BEAMS}")),
+    ] {
+        let [gpu, cpu] = ["gpu", "cpu"].map(|d| exposed(field, &straight(d, &rest)));
+        check_device(&gpu, &cpu, &rest);
+        let changed = changed(&gpu, &cpu, 2e-5);
+        assert!(changed <= 3, "{rest}: {changed}, {:e}", difference(&gpu, &cpu)[0]);
+    }
+    let dark = "[media]\nabsorption = \"a\"\nrotation = \"b\"\nanalyser_deg = 30.0\n";
+    let rest = format!("{KNIFE}{photons}{dark}");
+    let [gpu, cpu] = ["gpu", "cpu"].map(|d| exposed_through_smoke(&field, &straight(d, &rest)));
+    check_device(&gpu, &cpu, &rest);
+    assert!(changed(&gpu, &cpu, 5e-5) <= 3, "{:e}", difference(&gpu, &cpu)[0]);
 }
 
 /// Rays that a plane between media reflects are counted as turned and leave the film dark.
@@ -394,6 +438,10 @@ fn pictures_are_filtered_on_the_device_as_on_the_cpu() {
             "kind = \"gaussian\"\nsigma_px = 30.0",
             "kind = \"mean\"\nradius_px = 2.4",
             "kind = \"none\"",
+            "kind = \"cone\"\nnearest = 2",
+            "kind = \"cone\"\nnearest = 8",
+            "kind = \"cone\"\nnearest = 600",
+            "kind = \"cone\"\nnearest = 10000",
         ] {
             let rest = format!("{technique}{PHOTONS}[sampling.filter]\n{filter}\n");
             let [gpu, cpu] = ["gpu", "cpu"].map(|d| {
@@ -496,12 +544,48 @@ fn what_the_device_cannot_expose_is_named_and_exposed_by_the_cpu() {
         return;
     }
     let field = cube(17, lopsided);
-    let cone = "[sampling.filter]\nkind = \"cone\"\nnearest = 8\n";
+    let dots = "[technique]\nkind = \"bos\"\ndot_spacing_m = 1e-8\n";
     let [gpu, cpu] =
-        ["gpu", "cpu"].map(|d| exposed(&field, &scene(d, "", &format!("{KNIFE}{PHOTONS}{cone}"))));
-    assert!(difference(&gpu, &cpu)[0] < 1e-3);
-    let named = gpu.report.warnings.iter().filter(|w| w.contains("cone filter")).count();
-    assert_eq!((named, gpu.report.device.unwrap().photons), (1, 0), "{:?}", gpu.report.warnings);
+        ["gpu", "cpu"].map(|d| exposed(&field, &scene(d, "", &format!("{dots}{PHOTONS}"))));
+    let named = |o: &RenderOutput| o.report.warnings.iter().filter(|w| w.contains("dots")).count();
+    assert_eq!([named(&gpu), named(&cpu)], [1, 0], "{:?}", gpu.report.warnings);
+    assert_eq!(gpu.report.device.unwrap().photons, 0);
+    assert_eq!(gpu.report.tally.sent, cpu.report.tally.sent);
+}
+
+/// Photons are few in shadows and beyond the film's edge, many in a focus, and none where a body
+/// takes the whole film: pixels find the nearest wherever they are. Counts and noise come back as
+/// without the filter.
+#[test]
+fn the_cone_filter_finds_photons_in_shadows_and_foci_on_the_device() {
+    if !has_gpu() {
+        return;
+    }
+    let lens = cube(24, |p| -4e-3 * (p.x * p.x + p.y * p.y));
+    let thrown_out = cube(24, |p| 2e-3 * p.x);
+    let body = device::with_body(24);
+    let shadowgraph = "[technique]\nkind = \"shadowgraph\"\n";
+    for (name, field, film) in [
+        ("focus", &lens, "focus_m = 60.0\n"),
+        ("beyond the edge", &thrown_out, "focus_m = 150.0\n"),
+        ("shadow", &body, ""),
+        ("a corner of the shadow", &body, "field_of_view_m = 0.02\n"),
+    ] {
+        for nearest in [3, 40] {
+            let filter = format!("[sampling.filter]\nkind = \"cone\"\nnearest = {nearest}\n");
+            let [gpu, cpu] = both(field, film, &format!("{shadowgraph}{PHOTONS}{filter}"));
+            let [worst, brightest] = difference(&gpu, &cpu);
+            assert!(worst <= 5e-5 * brightest, "{name}, {nearest}: {worst:e} of {brightest}");
+            let [a, b] = [&gpu, &cpu].map(|o| o.counts.clone().expect("counts"));
+            let others = a.iter().zip(&b).filter(|(a, b)| a != b).count();
+            assert!(others <= 4, "{name}: {others} pixels have other numbers of photons");
+            assert!(gpu.noise.is_some() == cpu.noise.is_some(), "{name}");
+            assert_eq!(gpu.report.warnings, cpu.report.warnings, "{name}");
+            let again =
+                exposed(field, &scene("gpu", film, &format!("{shadowgraph}{PHOTONS}{filter}")));
+            assert_eq!(again.pixels, gpu.pixels, "{name}: other bits in the next run");
+        }
+    }
 }
 
 /// Cancelling ends a frame between two submissions.

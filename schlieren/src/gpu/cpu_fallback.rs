@@ -7,8 +7,8 @@ use super::method::{GpuOptions, Method};
 use crate::field::Field;
 use crate::interpolate::Interpolant;
 use crate::march::{
-    Deviational, FieldInterpolant, FullOfField, FullOptions, Integrator, Options, Pefrl,
-    RungeKutta4, Scheme, Sharma,
+    Deviational, FieldInterpolant, FullOfField, FullOptions, Integrator, LineOfSight, Options,
+    Pefrl, RungeKutta4, Scheme, Sharma,
 };
 use crate::path::{Exit, LightPaths, Start};
 use crate::view::View;
@@ -228,6 +228,10 @@ fn march_on_this_thread<'a>(
         Method::Pefrl => full(field, view, interpolant, options, Pefrl),
         Method::Sharma => full(field, view, interpolant, options, Sharma),
         Method::RungeKutta4 => full(field, view, interpolant, options, RungeKutta4),
+        // Never called: single rays of line of sight are not sent to the device.
+        Method::LineOfSight => {
+            Box::new(LineOfSight::new(field, view, interpolant, quantities, blank))
+        }
     }
 }
 

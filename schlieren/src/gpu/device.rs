@@ -27,7 +27,7 @@ pub struct Gpu {
     storage_buffers: u32,
     /// The first error outside an error scope.
     failure: Arc<OnceLock<String>>,
-    pipelines: Mutex<BTreeMap<String, wgpu::ComputePipeline>>,
+    pipelines: Mutex<BTreeMap<(String, &'static str), wgpu::ComputePipeline>>,
     /// How many photons it gets at a time.
     pub(super) part_size: PartSize,
     /// Whether this device has finished a batch.
@@ -365,13 +365,14 @@ impl Gpu {
         entry_point: &'static str,
     ) -> Result<wgpu::ComputePipeline, GpuError> {
         let mut made = self.pipelines.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(p) = made.get(&wgsl) {
+        let key = (wgsl, entry_point);
+        if let Some(p) = made.get(&key) {
             return Ok(p.clone());
         }
         let pipeline = self.checked(|| {
             let module = self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some(entry_point),
-                source: wgpu::ShaderSource::Wgsl(wgsl.as_str().into()),
+                source: wgpu::ShaderSource::Wgsl(key.0.as_str().into()),
             });
             self.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
                 label: Some(entry_point),
@@ -385,7 +386,7 @@ impl Gpu {
                 cache: None,
             })
         })?;
-        made.insert(wgsl, pipeline.clone());
+        made.insert(key, pipeline.clone());
         Ok(pipeline)
     }
 }

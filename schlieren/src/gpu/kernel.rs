@@ -4,6 +4,8 @@
 use super::Method;
 use crate::interpolate::Interpolant;
 
+/// Binding of the numbers of a projection, which is sampled where no rays are bound.
+pub(super) const PROJECTION: u32 = 1;
 /// First binding of the field's slabs. The bindings before it are parameters, rays, kernel outputs
 /// and kinds of nodes.
 pub(super) const FIRST_SLAB: u32 = 4;
@@ -22,6 +24,10 @@ pub(super) enum FieldLayout {
     RowTexture,
     /// Rows of four coefficients in a buffer.
     RowBuffer,
+    /// For [`Method::LineOfSight`]: a map of its projection along an axis.
+    ProjectedAlongAxis,
+    /// Likewise along any direction: that map, and two of slopes.
+    ProjectedObliquely,
 }
 
 impl FieldLayout {
@@ -29,7 +35,8 @@ impl FieldLayout {
     fn bindings(self) -> u32 {
         match self {
             FieldLayout::Slabs(count) => count,
-            FieldLayout::RowTexture | FieldLayout::RowBuffer => 1,
+            FieldLayout::ProjectedObliquely => 3,
+            FieldLayout::RowTexture | FieldLayout::RowBuffer | FieldLayout::ProjectedAlongAxis => 1,
         }
     }
 
@@ -60,8 +67,12 @@ impl Kernel {
         self.march() + include_str!("rays.wgsl")
     }
 
-    /// The source text of the march, without an entry point.
+    /// The source text of the march, without an entry point. Straight rays take no steps: it
+    /// samples the projection.
     pub(super) fn march(&self) -> String {
+        if self.method == Method::LineOfSight {
+            return self.line_of_sight();
+        }
         // Only the B-spline is accurate enough to need compensated sums, as on the CPU.
         let spline = self.interpolant == Interpolant::BSpline;
         let mut text = format!(
@@ -76,6 +87,7 @@ impl Kernel {
             Method::Pefrl => concat!(include_str!("full.wgsl"), include_str!("pefrl.wgsl")),
             Method::Sharma => concat!(include_str!("full.wgsl"), include_str!("sharma.wgsl")),
             Method::RungeKutta4 => concat!(include_str!("full.wgsl"), include_str!("rk4.wgsl")),
+            Method::LineOfSight => "",
         };
         text += &if self.skip {
             include_str!("bricks.wgsl")
@@ -105,7 +117,10 @@ impl Kernel {
             (FieldLayout::RowTexture, _) => (include_str!("bspline_row_texture.wgsl"), "vec3u"),
             (FieldLayout::RowBuffer, _) => (include_str!("bspline_row_buffer.wgsl"), "u32"),
             (FieldLayout::Slabs(_), true) => (include_str!("bspline_slab.wgsl"), "u32"),
-            (FieldLayout::Slabs(_), false) => ("", "u32"),
+            (_, false) => ("", "u32"),
+            (FieldLayout::ProjectedAlongAxis | FieldLayout::ProjectedObliquely, true) => {
+                ("", "u32")
+            }
         };
         for slab in 0..self.layout.bindings() {
             let binding = (FIRST_SLAB + slab).to_string();
@@ -118,6 +133,29 @@ impl Kernel {
         }
         text += &self.sample();
         text
+    }
+
+    fn line_of_sight(&self) -> String {
+        let oblique = self.layout == FieldLayout::ProjectedObliquely;
+        let mut text = format!("const OPD = {};\nconst OBLIQUE = {oblique};\n", self.opd);
+        text += include_str!("march.wgsl");
+        text += &include_str!("line_of_sight.wgsl")
+            .replace("PROJECTION_BINDING", &PROJECTION.to_string())
+            .replace("BINDING", &FIRST_SLAB.to_string());
+        for (side, binding) in ["right", "up"].iter().zip(FIRST_SLAB + 1..) {
+            text += &if oblique {
+                include_str!("line_of_sight_slopes.wgsl")
+                    .replace("SIDE", side)
+                    .replace("BINDING", &binding.to_string())
+            } else {
+                format!("fn {side}_slope(c: MapCell) -> f32 {{\n    return 0.0;\n}}\n")
+            };
+        }
+        text + if self.nodes {
+            include_str!("map_nodes.wgsl")
+        } else {
+            "fn map_node_kind(at: vec2f) -> u32 {\n    return 0u;\n}\n"
+        }
     }
 
     /// The function that samples eps (w) and its gradient per lattice step (xyz) in the slab that
@@ -175,7 +213,7 @@ mod tests {
             layout,
         };
         let mut kernels = Vec::new();
-        for method in Method::ALL {
+        for method in Method::ALL.into_iter().filter(|m| *m != Method::LineOfSight) {
             for interpolant in INTERPOLANTS {
                 for layout in LAYOUTS {
                     // Rows are coefficients, and one march skips.

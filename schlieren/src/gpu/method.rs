@@ -18,17 +18,26 @@ pub enum Method {
     Sharma,
     /// The classical Runge-Kutta method, likewise.
     RungeKutta4,
+    /// Straight rays ([`crate::march::LineOfSight`]): the CPU projects the field along the light,
+    /// and frames on the device sample the projection, in `f32` as on the CPU.
+    LineOfSight,
 }
 
 impl Method {
     /// All methods.
-    pub const ALL: [Method; 5] =
-        [Method::Verlet, Method::Euler, Method::Pefrl, Method::Sharma, Method::RungeKutta4];
+    pub const ALL: [Method; 6] = [
+        Method::Verlet,
+        Method::Euler,
+        Method::Pefrl,
+        Method::Sharma,
+        Method::RungeKutta4,
+        Method::LineOfSight,
+    ];
 
     /// Samples of the field per step.
     pub(super) fn samples(self) -> usize {
         match self {
-            Method::Verlet | Method::Euler => 1,
+            Method::Verlet | Method::Euler | Method::LineOfSight => 1,
             Method::Sharma => 3,
             Method::Pefrl | Method::RungeKutta4 => 4,
         }

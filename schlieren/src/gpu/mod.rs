@@ -14,12 +14,14 @@
 //! | kernel.rs, *.wgsl | the shader, assembled from what a scene needs |
 //! | bricks.rs | bricks that rays skip, and counts of what they skipped |
 //! | volume.rs, rows.rs | the field on the device: in slabs, or in rows of four coefficients |
+//! | projection.rs | its projection along the light, for straight rays |
 //! | part_size.rs | how many photons a device gets at a time |
 //! | paths.rs | [`GpuPaths`]: traces starts to exits in batches |
 //! | frame/ | a whole frame on the device: starts, march, cut-off, film |
 //! | cpu_fallback.rs | recovery of batches that the device does not finish, on a reopened device or on the CPU |
 //!
-//! Line of sight has no kernel. It is refused by name ([`GpuError::Unsupported`]).
+//! Single rays of line of sight are not sent: each would be more bytes than the numbers that it
+//! reads of the projection, so the CPU samples them. Frames sample the projection on the device.
 
 mod bricks;
 mod cpu_fallback;
@@ -29,13 +31,14 @@ mod kernel;
 mod method;
 mod part_size;
 mod paths;
+mod projection;
 mod rows;
 mod volume;
 mod work;
 
 pub use device::Gpu;
 pub use frame::MediaCache;
-pub(crate) use frame::{FrameMedia, NotExposed};
+pub(crate) use frame::{FrameFilter, FrameMedia, NotExposed};
 pub use method::{GpuOptions, Method};
 pub use paths::GpuPaths;
 pub use volume::VolumeCache;
@@ -60,9 +63,7 @@ pub enum GpuError {
         reason: String,
     },
     /// There is no kernel for the request.
-    #[error(
-        "the GPU has no kernel for {what}; it has verlet, euler, pefrl, sharma and rk4. {cure}"
-    )]
+    #[error("the GPU has no kernel for {what}. {cure}")]
     Unsupported {
         /// What was requested.
         what: String,

@@ -10,7 +10,9 @@ use super::work::{GpuCounters, Work};
 use super::{Gpu, GpuError};
 use crate::field::Field;
 use crate::interpolate::{BSpline, Interpolant};
-use crate::march::{BlankCells, FieldCache, Frame, KernelOutput, KernelRay};
+use crate::march::{
+    BlankCells, FieldCache, Frame, KernelOutput, KernelRay, LineOfSight, Projection,
+};
 use crate::path::{Exit, LightPaths, PathQuantities, SkipReport, Start};
 use crate::view::View;
 use bytemuck::{Pod, Zeroable};
@@ -42,6 +44,8 @@ pub struct GpuPaths<'a> {
     pub(super) frame: Frame,
     interpolant: Interpolant,
     pub(super) options: GpuOptions,
+    /// The projection that straight rays sample, with [`Method::LineOfSight`].
+    projection: Option<Arc<LineOfSight>>,
     /// Number of rays per dispatch.
     batch: usize,
     current: Mutex<CurrentDevice>,
@@ -56,7 +60,8 @@ pub(super) struct DeviceState {
     /// Number of devices that preceded this one.
     pub(super) number: u32,
     pub(super) kernel: Kernel,
-    pipeline: wgpu::ComputePipeline,
+    /// The kernel of single rays; there is none for straight rays.
+    pipeline: Option<wgpu::ComputePipeline>,
     pub(super) volume: Arc<DeviceVolume>,
     /// Counts of the steps that rays skip.
     skipping: Option<wgpu::Buffer>,
@@ -87,7 +92,8 @@ impl DeviceState {
             nodes: volume.kinds.is_some(),
             layout: volume.values.layout(),
         };
-        let pipeline = gpu.pipeline(kernel.of_rays(), "march")?;
+        let is_marched = options.method != Method::LineOfSight;
+        let pipeline = is_marched.then(|| gpu.pipeline(kernel.of_rays(), "march")).transpose()?;
         let skipping = volume.bricks.is_some().then(|| bricks::counts(&gpu)).transpose()?;
         let idle = Mutex::default();
         Ok(DeviceState { gpu, number, kernel, pipeline, volume, skipping, idle })
@@ -118,7 +124,7 @@ impl DeviceState {
     }
 
     /// Reuses or creates buffers for this number of rays.
-    fn scratch(&self, rays: usize) -> Result<Scratch, GpuError> {
+    fn scratch(&self, pipeline: &wgpu::ComputePipeline, rays: usize) -> Result<Scratch, GpuError> {
         let mut idle = self.idle.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(i) = idle.iter().position(|s| s.capacity >= rays) {
             return Ok(idle.swap_remove(i));
@@ -151,7 +157,7 @@ impl DeviceState {
                 .collect();
             let bindings = self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
                 label: None,
-                layout: &self.pipeline.get_bind_group_layout(0),
+                layout: &pipeline.get_bind_group_layout(0),
                 entries: &entries,
             });
             Scratch { capacity, params, rays, outputs, readback, bindings }
@@ -258,7 +264,14 @@ impl<'a> GpuPaths<'a> {
                 cure: "Set GpuOptions::skip_rad to 0, or march by Method::Verlet.",
             });
         }
-        let (volume, bytes) = caches.1.volume(&gpu, field, (interpolant, skip), caches.0)?;
+        let projection = (options.method == Method::LineOfSight).then(|| {
+            let GpuOptions { quantities, blank, .. } = options;
+            caches.0.line_of_sight(field, Projection { view, interpolant, quantities, blank })
+        });
+        let (volume, bytes) = match &projection {
+            Some(sight) => caches.1.projection(&gpu, sight)?,
+            None => caches.1.volume(&gpu, field, (interpolant, skip), caches.0)?,
+        };
         let work = Work::default();
         work.add_to_device(bytes);
         let on_device = DeviceState::new(gpu, 0, volume, interpolant, options)?;
@@ -267,6 +280,7 @@ impl<'a> GpuPaths<'a> {
             frame: Frame::new(field, view),
             interpolant,
             options,
+            projection,
             batch: BATCH / options.method.samples(),
             current: Mutex::new(CurrentDevice { on_device: Arc::new(on_device), attempts: 0 }),
             cpu_fallback_paths: CpuFallback::of_march(field, view, interpolant, options),
@@ -377,7 +391,13 @@ impl BatchTracer for GpuPaths<'_> {
         } else {
             self.prepare(starts, &mut prepared, &mut rays);
         }
-        let scratch = on_device.scratch(starts.len()).map_err(|e| on_device.failure(e))?;
+        // Straight rays are not sent.
+        let Some(pipeline) = &on_device.pipeline else {
+            let error = gpu.failed("single rays of a projection have no kernel");
+            return Err(on_device.failure(error));
+        };
+        let scratch =
+            on_device.scratch(pipeline, starts.len()).map_err(|e| on_device.failure(e))?;
         let queue = &gpu.queue;
         queue.write_buffer(
             &scratch.params,
@@ -388,7 +408,7 @@ impl BatchTracer for GpuPaths<'_> {
         let mut commands = gpu.device.create_command_encoder(&Default::default());
         {
             let mut pass = commands.begin_compute_pass(&Default::default());
-            pass.set_pipeline(&on_device.pipeline);
+            pass.set_pipeline(pipeline);
             pass.set_bind_group(0, &scratch.bindings, &[]);
             pass.dispatch_workgroups(starts.len().div_ceil(WORKGROUP) as u32, 1, 1);
         }
@@ -474,8 +494,15 @@ impl GpuPaths<'_> {
         let gpu = Arc::clone(gpu);
         current.attempts += 1;
         let gpu = gpu.current()?;
-        let values = NodeValues::on_this_thread(self.field, self.interpolant);
         let number = failed.device + 1;
+        if let Some(sight) = &self.projection {
+            let volume = Arc::new(DeviceVolume::projected(&gpu, sight)?);
+            self.work.add_to_device(volume.bytes);
+            let made = DeviceState::new(gpu, number, volume, self.interpolant, self.options)?;
+            current.on_device = Arc::new(made);
+            return Ok(());
+        }
+        let values = NodeValues::on_this_thread(self.field, self.interpolant);
         let bricks = match &values {
             _ if self.options.skip_rad <= 0.0 => None,
             NodeValues::BSpline(spline) => Some(DeviceBricks::new(&gpu, self.field, spline, true)?),
@@ -494,6 +521,9 @@ impl GpuPaths<'_> {
 
 impl LightPaths for GpuPaths<'_> {
     fn trace(&self, starts: &[Start], exits: &mut [Exit]) {
+        if let Some(sight) = &self.projection {
+            return sight.trace(starts, exits);
+        }
         self.work.add_rays(starts.len() as u64);
         self.cpu_fallback_paths.trace(self, self.batch, starts, exits, false);
     }
@@ -503,7 +533,7 @@ impl LightPaths for GpuPaths<'_> {
     }
 
     fn rays_at_once(&self) -> Option<usize> {
-        None
+        self.projection.as_ref().and_then(|sight| sight.rays_at_once())
     }
 
     fn quantities(&self) -> PathQuantities {
@@ -530,6 +560,9 @@ impl LightPaths for GpuPaths<'_> {
     }
 
     fn trace_parallel(&self, starts: &[Start], exits: &mut [Exit]) {
+        if let Some(sight) = &self.projection {
+            return sight.trace_parallel(starts, exits);
+        }
         self.work.add_rays(starts.len() as u64);
         self.cpu_fallback_paths.trace(self, self.batch, starts, exits, true);
     }

@@ -3,11 +3,12 @@
 
 use super::bricks::DeviceBricks;
 use super::kernel::{FIRST_SLAB, FieldLayout};
+use super::projection::DeviceProjection;
 use super::rows::{self, Rows};
 use super::{Gpu, GpuError};
 use crate::field::Field;
 use crate::interpolate::{BSpline, Interpolant, TrilinearGradient};
-use crate::march::FieldCache;
+use crate::march::{FieldCache, LineOfSight};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Keeps a field on the device for the next image of it. The owner must pass the same field to
@@ -15,6 +16,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 #[derive(Default)]
 pub struct VolumeCache {
     kept: Mutex<Option<Kept>>,
+    projection: Mutex<Option<KeptProjection>>,
 }
 
 struct Kept {
@@ -24,7 +26,36 @@ struct Kept {
     volume: Arc<DeviceVolume>,
 }
 
+struct KeptProjection {
+    gpu: Arc<Gpu>,
+    sight: Arc<LineOfSight>,
+    volume: Arc<DeviceVolume>,
+}
+
 impl VolumeCache {
+    /// A projection of the field on a device, and the number of bytes that were copied there for
+    /// it. The newest is kept.
+    ///
+    /// # Errors
+    /// If it does not fit, or the device fails.
+    pub(super) fn projection(
+        &self,
+        gpu: &Arc<Gpu>,
+        sight: &Arc<LineOfSight>,
+    ) -> Result<(Arc<DeviceVolume>, u64), GpuError> {
+        let mut kept = self.projection.lock().unwrap_or_else(PoisonError::into_inner);
+        let is_this =
+            |k: &&KeptProjection| Arc::ptr_eq(&k.gpu, gpu) && Arc::ptr_eq(&k.sight, sight);
+        if let Some(kept) = kept.as_ref().filter(is_this) {
+            return Ok((Arc::clone(&kept.volume), 0));
+        }
+        let volume = Arc::new(DeviceVolume::projected(gpu, sight)?);
+        let (gpu, sight) = (Arc::clone(gpu), Arc::clone(sight));
+        *kept = Some(KeptProjection { gpu, sight, volume: Arc::clone(&volume) });
+        let bytes = volume.bytes;
+        Ok((volume, bytes))
+    }
+
     /// The field on a device, and the number of bytes that were copied there for it. The newest is
     /// kept.
     ///
@@ -117,6 +148,8 @@ pub(super) enum Values {
     Slabs(Vec<wgpu::Buffer>),
     /// Coefficients of the spline, each with the three that follow.
     Rows(Rows),
+    /// Its projection along the light.
+    Projection(DeviceProjection),
 }
 
 impl Values {
@@ -125,6 +158,7 @@ impl Values {
             Values::Slabs(slabs) => FieldLayout::Slabs(slabs.len() as u32),
             Values::Rows(Rows::Texture(_)) => FieldLayout::RowTexture,
             Values::Rows(Rows::Buffer(_)) => FieldLayout::RowBuffer,
+            Values::Projection(projection) => projection.layout(),
         }
     }
 
@@ -139,6 +173,7 @@ impl Values {
                 vec![(FIRST_SLAB, wgpu::BindingResource::TextureView(view))]
             }
             Values::Rows(Rows::Buffer(rows)) => vec![(FIRST_SLAB, rows.as_entire_binding())],
+            Values::Projection(projection) => projection.bindings(),
         }
     }
 }
@@ -236,7 +271,7 @@ fn cut(
 }
 
 /// Packs two bits per node, sixteen nodes per word.
-fn packed(nodes: &[crate::field::Node]) -> Vec<u32> {
+pub(super) fn packed(nodes: &[crate::field::Node]) -> Vec<u32> {
     let word = |w: &[crate::field::Node]| {
         w.iter().enumerate().fold(0, |a, (i, n)| a | (*n as u32) << (2 * i))
     };

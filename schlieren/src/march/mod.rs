@@ -52,6 +52,8 @@ pub use integrator::{Integrator, InterpolatedMedium, Medium, Ray};
 pub(crate) use kernel_ray::KernelOutput;
 pub(crate) use kernel_ray::KernelRay;
 pub use line_of_sight::LineOfSight;
+#[cfg(feature = "gpu")]
+pub(crate) use line_of_sight::ProjectedMap;
 pub(crate) use on_cells::CellWork;
 pub use on_cells::{CellCounters, OnCells};
 pub use pefrl::Pefrl;

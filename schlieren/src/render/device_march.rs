@@ -2,7 +2,7 @@
 
 use super::planned::Choice;
 use crate::field::Field;
-use crate::gpu::{GpuError, GpuPaths, Method};
+use crate::gpu::{GpuPaths, Method};
 use crate::interpolate::Interpolant;
 use crate::march::FieldCache;
 use crate::media::Bend;
@@ -24,14 +24,6 @@ pub(super) struct DeviceMarch {
     pub(super) achieved: Option<MeasuredError>,
 }
 
-/// The error for options that a scene names but that have no kernel.
-pub(super) fn unsupported(march: &MarchSpec) -> Option<GpuError> {
-    (march.method.as_deref() == Some("line-of-sight")).then(|| GpuError::Unsupported {
-        what: "the march line-of-sight".into(),
-        cure: "Omit --march, or compute on the CPU (--device cpu).",
-    })
-}
-
 /// A march that only its name selects.
 fn for_comparison(name: &str) -> Option<(&'static str, Method, Bend)> {
     match name {
@@ -43,8 +35,7 @@ fn for_comparison(name: &str) -> Option<(&'static str, Method, Bend)> {
 }
 
 impl DeviceMarch {
-    /// The march that a scene names, or that follows from its plan. What has no kernel was refused
-    /// before ([`unsupported`]).
+    /// The march that a scene names, or that follows from its plan.
     pub(super) fn new(
         march: &MarchSpec,
         plan: Plan,
@@ -65,20 +56,35 @@ impl DeviceMarch {
                 achieved: None,
             };
         }
-        // The error is measured with the CPU's march. Only steps and interpolant can be refined:
-        // the GPU has no finer arithmetic. A plan makes PEFRL with the spline only.
-        let here = Plan { request: Request { mode: Some(plan.mode), ..request }, ..plan };
+        // The error is measured with the CPU's march. Straight rays may become bent ones; besides,
+        // only steps and interpolant can be refined: the GPU has no finer arithmetic. A plan makes
+        // PEFRL with the spline only.
+        let refined = |plan: Plan, mode, rays| {
+            let here = Plan { request: Request { mode, ..request }, ..plan };
+            here.within_tolerance(field, view, rays, cache)
+        };
         let by_name = plan.mode == Mode::Full && plan.interpolant != Interpolant::BSpline;
         let (plan, achieved) = match measured_rays.filter(|_| !by_name) {
             None => (plan, None),
+            Some(rays) if plan.mode == Mode::LineOfSight => {
+                let mut best = refined(plan, request.mode, rays);
+                if best.0.mode == Mode::Full {
+                    let mode = Some(Mode::Paraxial);
+                    let bent = Request { mode, ..request };
+                    let bounds = plan.derivative_bounds;
+                    best = refined(Plan::from_derivative_bounds(field, bent, bounds), mode, rays);
+                }
+                (Plan { request, ..best.0 }, Some(best.1))
+            }
             Some(rays) => {
-                let (refined, error) = here.within_tolerance(field, view, rays, cache);
+                let (refined, error) = refined(plan, Some(plan.mode), rays);
                 (Plan { request, ..refined }, Some(error))
             }
         };
         let (name, method) = match plan.mode {
             Mode::Full => ("pefrl", Method::Pefrl),
-            Mode::Paraxial | Mode::LineOfSight => ("verlet", Method::Verlet),
+            Mode::Paraxial => ("verlet", Method::Verlet),
+            Mode::LineOfSight => ("line-of-sight", Method::LineOfSight),
         };
         DeviceMarch {
             name,

@@ -226,24 +226,25 @@ fn expose_line<const C: usize>(
             }
             let films: Vec<Film<C>> =
                 (0..if two { 2 } else { 1 }).map(|_| Film::new(framing, layers.counts)).collect();
-            let by_gpu = match keep {
-                true => {
-                    on_gpu::warn_of_cone_filter(planned, &mut r.report);
-                    None
-                }
-                false => on_gpu::expose_photons(
+            // Without counts, the device was asked above, and has refused.
+            let by_gpu = match layers.counts {
+                false => None,
+                true => on_gpu::expose_photons(
                     planned,
                     setup,
                     &films,
-                    samples,
+                    (samples, filter),
                     &control,
                     &mut r.report,
                 )?,
             };
-            let exposed = match by_gpu {
-                Some(tally) => ExposedFilm { tally, landed: Vec::new() },
-                None => expose(setup, &films, 0..samples, keep, cancel, &progress)
-                    .ok_or(RenderError::Cancelled)?,
+            let (exposed, picture) = match by_gpu {
+                Some((tally, picture)) => (ExposedFilm { tally, landed: Vec::new() }, picture),
+                None => {
+                    let exposed = expose(setup, &films, 0..samples, keep, cancel, &progress)
+                        .ok_or(RenderError::Cancelled)?;
+                    (exposed, None)
+                }
             };
             add_photons(&mut r.report, &exposed.tally, setup);
             if two {
@@ -255,13 +256,10 @@ fn expose_line<const C: usize>(
             if layers.counts {
                 r.counts = films[0].counts();
             }
-            filtered(
-                &films[0].to_pixels(f64::from(samples)),
-                &exposed.landed,
-                &framing,
-                filter,
-                samples,
-            )
+            picture.unwrap_or_else(|| {
+                let pixels = films[0].to_pixels(f64::from(samples));
+                filtered(&pixels, &exposed.landed, &framing, filter, samples)
+            })
         }
     };
     Ok(film)

@@ -1,7 +1,7 @@
 //! Plans light paths on the GPU, or gives the reason why the CPU computes them.
 
 #[cfg(feature = "gpu")]
-use super::device_march::{self, DeviceMarch};
+use super::device_march::DeviceMarch;
 use super::planned::PlannedPaths;
 #[cfg(feature = "gpu")]
 use super::planned::{described, skipping_has_no_effect};
@@ -16,8 +16,7 @@ use crate::scene::{Device, MarchSpec};
 use crate::view::View;
 use std::sync::atomic::AtomicBool;
 
-/// Checks whether a scene's march can be computed on this machine's GPU, whatever the flow is, if
-/// the scene requests a GPU. Opens the GPU.
+/// Opens this machine's GPU if the scene requests one.
 ///
 /// # Errors
 /// The reason why not, with the cure.
@@ -26,9 +25,7 @@ pub fn check_gpu(march: &MarchSpec) -> Result<(), RenderError> {
         return Ok(());
     }
     #[cfg(feature = "gpu")]
-    return device_march::unsupported(march)
-        .map_or_else(|| crate::gpu::Gpu::shared().map(|_| ()), Err)
-        .map_err(RenderError::Gpu);
+    return crate::gpu::Gpu::shared().map(|_| ()).map_err(RenderError::Gpu);
     #[cfg(not(feature = "gpu"))]
     Err(RenderError::NoGpu)
 }
@@ -48,7 +45,7 @@ fn fallback_reason(requested: Device, error: crate::gpu::GpuError) -> Result<Str
 }
 
 /// Paths on the GPU if the scene wants it and it is possible. Otherwise the inner `Err` has the
-/// reason, or `None` when the CPU was requested or the plan finds it faster.
+/// reason, or `None` when the CPU was requested.
 #[cfg(feature = "gpu")]
 pub(super) fn on_gpu<'a>(
     march: &MarchSpec,
@@ -59,30 +56,15 @@ pub(super) fn on_gpu<'a>(
     caches: &Caches,
 ) -> Result<Result<PlannedPaths<'a>, Option<String>>, RenderError> {
     use crate::gpu::{Gpu, GpuError, GpuOptions, GpuPaths, Method};
-    use crate::plan::{Mode, Plan};
+    use crate::plan::Plan;
     use std::sync::Arc;
 
     if march.device == Device::Cpu {
         return Ok(Err(None));
     }
     let cache = &caches.field;
-    let mut plan = Plan::from_derivative_bounds(field, request, cache.derivative_bounds(field));
-    if plan.mode == Mode::LineOfSight && request.mode.is_none() {
-        if march.device == Device::Auto {
-            return Ok(Err(None));
-        }
-        // The GPU was requested and has no line of sight, so Verlet is used, which is more
-        // accurate.
-        plan = Plan::from_derivative_bounds(
-            field,
-            Request { mode: Some(Mode::Paraxial), ..request },
-            plan.derivative_bounds,
-        );
-    }
+    let plan = Plan::from_derivative_bounds(field, request, cache.derivative_bounds(field));
     let made = (|| {
-        if let Some(e) = device_march::unsupported(march) {
-            return Err(e);
-        }
         let mut gpu = Gpu::shared()?;
         if march.device == Device::Auto && gpu.is_software() {
             return Err(GpuError::NoAdapter(format!(
@@ -172,9 +154,15 @@ pub(super) fn photograph_photons<const C: usize>(
     report: &mut Report,
 ) -> Result<Option<Photograph<C>>, RenderError> {
     #[cfg(feature = "gpu")]
-    if let (Some(device), Some(filter)) = (&planned.on_device, filter.weights()) {
+    if let Some(device) = &planned.on_device {
+        use crate::gpu::FrameFilter;
         let FilmControl { cancel, progress } = *control;
-        let (media, filter) = (planned.media_on_device.as_ref(), (&filter[..], noise));
+        let weights = filter.weights();
+        let filter = match (filter, &weights) {
+            (Filter::Cone { nearest }, _) => FrameFilter::Cone { nearest },
+            (_, weights) => FrameFilter::Weights(weights.as_deref().unwrap_or(&[1.0])),
+        };
+        let (media, filter) = (planned.media_on_device.as_ref(), (filter, noise));
         let passes = 0..samples;
         let made =
             device.photograph_photons(setup, media, framing, passes, filter, cancel, progress);
@@ -211,27 +199,35 @@ pub(super) fn photograph_beams<const C: usize>(
     Ok(None)
 }
 
-/// Exposes films by photons where the paths are, as [`photograph_photons`]. The CPU filters them.
+/// Exposes films by photons where the paths are, as [`photograph_photons`]. The CPU filters them,
+/// but for the cone filter, whose picture comes with them.
 pub(super) fn expose_photons<const C: usize>(
     planned: &PlannedPaths<'_>,
     setup: &Exposure<'_>,
     films: &[Film<C>],
-    samples: u32,
+    (samples, filter): (u32, Filter),
     control: &FilmControl<'_>,
     report: &mut Report,
-) -> Result<Option<Tally>, RenderError> {
+) -> Result<Option<FilmOfDevice<C>>, RenderError> {
     #[cfg(feature = "gpu")]
     if let Some(device) = &planned.on_device {
         let FilmControl { cancel, progress } = *control;
         let media = planned.media_on_device.as_ref();
-        let made = device.expose_photons(setup, media, films, 0..samples, cancel, progress);
+        let cone = match filter {
+            Filter::Cone { nearest } => Some(nearest),
+            _ => None,
+        };
+        let made = device.expose_photons(setup, media, films, 0..samples, cone, cancel, progress);
         let made = exposed(made, report)?;
-        count_media(planned, made.as_ref().map(not_behind_bodies));
+        count_media(planned, made.as_ref().map(|(tally, _)| not_behind_bodies(tally)));
         return Ok(made);
     }
-    let _ = (planned, setup, films, samples, control, report);
+    let _ = (planned, setup, films, samples, filter, control, report);
     Ok(None)
 }
+
+/// Counts of photons, and the picture of a cone filter.
+pub(super) type FilmOfDevice<const C: usize> = (Tally, Option<Vec<[f32; C]>>);
 
 /// Cancels an exposure and reports its progress.
 #[derive(Clone, Copy)]
@@ -273,17 +269,6 @@ fn exposed<T>(
             Ok(None)
         }
     }
-}
-
-/// Warns that a cone filter needs every photon, which stay on the device otherwise.
-pub(super) fn warn_of_cone_filter(planned: &PlannedPaths<'_>, report: &mut Report) {
-    #[cfg(feature = "gpu")]
-    if planned.on_device.is_some() {
-        let refused = crate::gpu::NotExposed::Refused("the cone filter keeps every photon".into());
-        // A refusal is no error.
-        let _ = exposed::<()>(Err(refused), report);
-    }
-    let _ = (planned, report);
 }
 
 /// The warning that only the march is on the GPU.

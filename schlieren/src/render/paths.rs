@@ -126,7 +126,7 @@ impl TestSection {
             skip_opd_m: SKIPPED_WAVES * scene.light.wavelengths_nm[line] * 1e-9,
         };
 
-        // What is repeated is as good as forced. The mode is not: the GPU has one only.
+        // What is repeated is as good as forced.
         let known = match accuracy {
             Accuracy::Known(Choice::Lattice(plan)) => Some(plan),
             _ => None,
@@ -143,6 +143,7 @@ impl TestSection {
             "verlet" => Mode::Paraxial,
             _ => Mode::Full,
         });
+        let mode = known.map_or(mode, |p| Some(p.mode));
         let planned =
             on_gpu(march, field, view, with(mode), measure.then_some(MEASURED_RAYS), caches)?;
         let why_not = match planned {
@@ -165,7 +166,6 @@ impl TestSection {
                 let bend = if name == "euler" { Bend::Paraxial } else { Bend::Full };
                 (paths, described(name, interpolant, step_voxels), None, (bend, step_voxels))
             } else {
-                let mode = known.map_or(mode, |p| Some(p.mode));
                 let mut plan =
                     Plan::from_derivative_bounds(field, with(mode), cache.derivative_bounds(field));
                 // A plan makes PEFRL with the spline only.

@@ -1,4 +1,17 @@
-// What a ray brings to the film: march/kernel_ray.rs and optics.rs in f32.
+// What a ray brings to the film: march/kernel_ray.rs and optics.rs in f32. `cross_flow` is in
+// crossing_bent.wgsl or crossing_straight.wgsl.
+
+// A ray's way through the flow, in the frame of the image.
+struct Crossing {
+    deflection_rad: vec2f,
+    displacement_m: vec2f,
+    // Optical path difference within the flow by the reference index; 0 if it is not wanted.
+    path_m: f32,
+    // Where the ray leaves the flow.
+    exit_depth_m: f32,
+    worst_node: u32,
+    steps: u32,
+}
 
 struct Photon {
     // Start in the plane through the view's centre.
@@ -17,20 +30,6 @@ struct Photon {
     left: f32,
 }
 
-// Components of a deviation along the right and up of a ray's own beam, whose frame is the view's
-// turned by the smallest rotation: with the direction (a, b, c) in the view's axes, right becomes
-// (1 - a^2/(1+c), -ab/(1+c), -a).
-fn across_beam(deviation: vec3f, tilt: vec2f) -> vec2f {
-    let plain = vec2f(dot(deviation, frame.right), dot(deviation, frame.up));
-    if TILTED_BEAMS {
-        let c = inverseSqrt(1.0 + dot(tilt, tilt));
-        let ab = tilt * c;
-        let turned = plain - ab * (dot(ab, plain) / (1.0 + c) + dot(deviation, frame.forward));
-        return vec2f(frame.mirror * turned.x, turned.y);
-    }
-    return vec2f(frame.mirror * plain.x, plain.y);
-}
-
 fn trace(position_m: vec2f, image_point_m: vec2f) -> Photon {
     var photon: Photon;
     photon.position_m = position_m;
@@ -39,27 +38,19 @@ fn trace(position_m: vec2f, image_point_m: vec2f) -> Photon {
     if TILTED_BEAMS {
         tilt = image_point_m / frame.schlieren_focal_length_m;
     }
-    let start = undisturbed(position_m, tilt);
-    let out = march_ray(start.ray);
-    photon.worst_node = out.worst_node;
-    photon.steps = start.ray.steps;
-    let v = out.v * frame.spacing * start.scale;
-    let xi = (out.xi - start.ray.xi) * frame.spacing * (start.scale * start.scale * frame.unit_m);
-    let deflection = across_beam(v, start.tilt);
-    var displacement_m = across_beam(xi, start.tilt);
-    if start.ray.steps == 0u {
-        displacement_m = vec2f(0.0);
-    }
-    photon.deflection_rad = deflection;
+    let crossing = cross_flow(position_m, tilt);
+    photon.worst_node = crossing.worst_node;
+    photon.steps = crossing.steps;
+    photon.deflection_rad = crossing.deflection_rad;
     // Deflections are sines.
-    let lever_m = frame.focus_m - start.exit_depth_m;
-    let sine2 = dot(deflection, deflection);
+    let lever_m = frame.focus_m - crossing.exit_depth_m;
+    let sine2 = dot(crossing.deflection_rad, crossing.deflection_rad);
     let cosine = sqrt(max(1.0 - sine2, 1.1754944e-38));
-    photon.shift_m =
-        tilt * frame.focus_m + (displacement_m + deflection * (lever_m / cosine));
+    photon.shift_m = tilt * frame.focus_m
+        + (crossing.displacement_m + crossing.deflection_rad * (lever_m / cosine));
     if OPD {
-        photon.path_m = out.opd * start.scale * frame.unit_m * frame.n0
-            + frame.n0 * lever_m * sine2 / (cosine * (1.0 + cosine));
+        photon.path_m =
+            crossing.path_m * frame.n0 + frame.n0 * lever_m * sine2 / (cosine * (1.0 + cosine));
     }
     photon.left = 1.0;
     if MEDIA && !is_stopped(photon) {

@@ -59,8 +59,9 @@ struct Frame {
     per_photon: f32,
     // The same of the two films of a picture with noise.
     per_photon_of_film: vec2f,
-    unused_0: f32,
-    unused_1: f32,
+    // Of photons that are kept: the first of this submission, and how many the cone filter takes.
+    first_photon: u32,
+    nearest: u32,
     // Numbers of the technique.
     technique: array<vec4f, 4>,
 }

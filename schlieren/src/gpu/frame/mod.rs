@@ -10,16 +10,20 @@
 //! |---|---|
 //! | params.rs, frame.wgsl | the numbers of a frame |
 //! | double.wgsl, sampler.wgsl | numbers of 48 bits; sample points |
-//! | start.wgsl, exit.wgsl | a photon's ray, and what it brings to the film |
+//! | start.wgsl | a photon's ray |
+//! | crossing_bent.wgsl, crossing_straight.wgsl | its way through the flow |
+//! | exit.wgsl | what it brings to the film |
 //! | media.rs, media.wgsl, property.wgsl | absorption and rotation on a photon's way |
 //! | bodies.wgsl | the bits of rays that bodies stop |
 //! | technique.rs, technique/*.wgsl | its energy, by technique and cut-off |
 //! | photons.wgsl, corners.wgsl, triangles.wgsl | entry points |
 //! | film.rs, film.wgsl | the sums |
+//! | cone.rs, squares.wgsl, keep.wgsl, sort.wgsl, cone.wgsl | the cone filter, which keeps photons |
 //! | filter*.wgsl | brightness and its filter, unless more than the picture is wanted |
 //! | submissions.rs | buffers and kernels on a device, and the parts of a frame |
 //! | shader.rs | the shaders, assembled from what a scene needs |
 
+mod cone;
 mod film;
 mod media;
 mod params;
@@ -56,6 +60,18 @@ enum Light {
     Beams { per_side: u32 },
 }
 
+/// A filter of a picture on the device.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum FrameFilter<'a> {
+    /// Weights by distance, along rows and columns.
+    Weights(&'a [f64]),
+    /// A cone over this many photons.
+    Cone {
+        /// Number of photons.
+        nearest: u32,
+    },
+}
+
 /// A film to expose.
 struct Job<'a> {
     exposure: &'a Exposure<'a>,
@@ -65,8 +81,8 @@ struct Job<'a> {
     /// What dims the light on its way.
     media: Option<&'a FrameMedia<'a>>,
     light: Light,
-    /// Weights of a filter by distance, if the picture is made on the device.
-    filter: Option<&'a [f64]>,
+    /// The filter, if the picture is made on the device.
+    filter: Option<FrameFilter<'a>>,
     cancel: &'a AtomicBool,
     /// Receives the number of photons or corners of each submission.
     progress: &'a (dyn Fn(u64) + Sync),
@@ -79,6 +95,20 @@ impl Job<'_> {
             .map(|n| u64::from(n) + 2 * u64::from(self.exposure.margin_px))
     }
 
+    /// How many photons are kept for a cone filter, with room for those of tiles beyond the area,
+    /// and how many of them it takes.
+    fn keeps(&self) -> Option<(usize, u32)> {
+        let (Some(FrameFilter::Cone { nearest }), Light::Photons { passes }) =
+            (self.filter, &self.light)
+        else {
+            return None;
+        };
+        let [width, height] = self.area();
+        let [across, down] = submissions::TILE_SIDES.map(u64::from);
+        let tiles = width.div_ceil(across) * height.div_ceil(down) * passes.len() as u64;
+        Some((tiles as usize * submissions::TILE, nearest))
+    }
+
     /// Corners of a row of beams.
     fn columns(&self, per_side: u32) -> usize {
         self.area()[0] as usize * per_side as usize + 1
@@ -86,7 +116,8 @@ impl Job<'_> {
 }
 
 impl GpuPaths<'_> {
-    /// As [`crate::film::photons::expose`], on the device.
+    /// As [`crate::film::photons::expose`], on the device. With `cone`, the number of photons of a
+    /// cone filter, also the picture: brightness of each pixel. The films must have counts then.
     ///
     /// # Errors
     /// If it was cancelled, or the device cannot expose this film.
@@ -96,21 +127,23 @@ impl GpuPaths<'_> {
         media: Option<&FrameMedia<'_>>,
         films: &[Film<C>],
         passes: Range<u32>,
+        cone: Option<u32>,
         cancel: &AtomicBool,
         progress: &(dyn Fn(u64) + Sync),
-    ) -> Result<Tally, NotExposed> {
+    ) -> Result<(Tally, Option<Vec<[f32; C]>>), NotExposed> {
         let layout = FilmLayout::of(films);
         let light = Light::Photons { passes };
         let framing = *films[0].framing();
+        let filter = cone.map(|nearest| FrameFilter::Cone { nearest });
         let (words, tally) =
-            self.expose(exposure, media, framing, layout, light, None, cancel, progress)?;
+            self.expose(exposure, media, framing, layout, light, filter, cancel, progress)?;
         add_to_films(layout, &words, films);
-        Ok(tally)
+        let picture = cone.map(|_| pictures(&words[layout.outcomes()..]));
+        Ok((tally, picture))
     }
 
-    /// A picture by photons, filtered with weights by distance along rows and columns: brightness
-    /// of each pixel. With `noise` also half the difference of the pictures that even and odd
-    /// passes make.
+    /// A filtered picture by photons: brightness of each pixel. With `noise` also half the
+    /// difference of the pictures that even and odd passes make.
     ///
     /// # Errors
     /// If it was cancelled, or the device cannot make this picture.
@@ -120,7 +153,7 @@ impl GpuPaths<'_> {
         media: Option<&FrameMedia<'_>>,
         framing: Framing,
         passes: Range<u32>,
-        (filter, noise): (&[f64], bool),
+        (filter, noise): (FrameFilter<'_>, bool),
         cancel: &AtomicBool,
         progress: &(dyn Fn(u64) + Sync),
     ) -> Result<Photograph<C>, NotExposed> {
@@ -149,7 +182,7 @@ impl GpuPaths<'_> {
     ) -> Result<Photograph<C>, NotExposed> {
         let light = Light::Beams { per_side };
         let layout = FilmLayout::of_picture::<C>(&framing, false);
-        let filter = Some(&[1.0][..]);
+        let filter = Some(FrameFilter::Weights(&[1.0]));
         let (words, tally) =
             self.expose(exposure, media, framing, layout, light, filter, cancel, progress)?;
         Ok(Photograph { pixels: pictures(&words), noise: None, tally })
@@ -163,7 +196,7 @@ impl GpuPaths<'_> {
         framing: Framing,
         layout: FilmLayout,
         light: Light,
-        filter: Option<&[f64]>,
+        filter: Option<FrameFilter<'_>>,
         cancel: &AtomicBool,
         progress: &(dyn Fn(u64) + Sync),
     ) -> Result<(Vec<u32>, Tally), NotExposed> {
@@ -195,7 +228,8 @@ impl GpuPaths<'_> {
         let image = technique.image.map_or(0, |i| size_of_val(i.pixels()));
         let corners = submissions::corner_bytes(&job);
         let largest = (4 * layout.words()).max(image).max(corners) as u64;
-        let largest = largest.max(media.map_or(0, FrameMedia::largest_buffer));
+        let kept = job.keeps().map_or(0, |(n, _)| cone::kept_bytes(n, layout.channels()));
+        let largest = largest.max(kept as u64).max(media.map_or(0, FrameMedia::largest_buffer));
         let binding = self.gpu().binding_bytes();
         if largest > binding {
             return Err(refused(format!(
@@ -208,6 +242,7 @@ impl GpuPaths<'_> {
         let buffers = 1
             + u32::from(image > 0)
             + u32::from(exposure.solids.is_some())
+            + if kept > 0 { 2 } else { 0 }
             + media.map_or(0, FrameMedia::buffers)
             + on_device.field_buffers();
         if buffers > on_device.gpu.storage_buffers() {
@@ -319,7 +354,7 @@ mod tests {
             technique: &broken,
             media: None,
             light: Light::Photons { passes: 0..1 },
-            filter: Some(&[1.0]),
+            filter: Some(FrameFilter::Weights(&[1.0])),
             cancel: &AtomicBool::new(false),
             progress: &|_| (),
         };

@@ -48,7 +48,8 @@ pub(super) struct FrameParams {
     pub(super) dots_seed: u32,
     pub(super) per_photon: f32,
     pub(super) per_photon_of_film: [f32; 2],
-    unused: [f32; 2],
+    pub(super) first_photon: u32,
+    pub(super) nearest: u32,
     pub(super) technique: [[f32; 4]; 4],
 }
 

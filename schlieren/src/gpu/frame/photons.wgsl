@@ -1,5 +1,7 @@
 // Sends photons: one invocation traces one photon and deposits it. A work group has a tile of
 // 16 x 4 pixels in the pass `number`: neighbours along x read the same lines of memory.
+//
+// The host adds `const COUNTS` and `keep` (keep.wgsl, or without effect).
 
 fn send(x: i32, y: i32, number: u32, ray: u32) {
     if is_behind_body(ray) {
@@ -31,6 +33,7 @@ fn send(x: i32, y: i32, number: u32, ray: u32) {
     }
     atomicAdd(&outcomes[LANDED], 1u);
     let at = vec2f(f32(x), f32(y)) + jitter + vec2f(shift.x, -shift.y) * frame.per_pixel_m;
+    keep(frame.first_photon + ray, at, energy);
     let size = vec2f(f32(frame.width), f32(frame.height));
     if all(at >= vec2f(0.0)) && all(at < size) {
         let pixel = u32(at.y) * frame.width + u32(at.x);

@@ -2,6 +2,7 @@
 
 use super::media::FrameMedia;
 use super::technique::TechniqueShader;
+use crate::gpu::Method;
 use crate::gpu::kernel::Kernel;
 use crate::optics::SourceImage;
 use rt_core::sampler::Sampling;
@@ -21,6 +22,8 @@ pub(super) struct FrameShader<'a> {
     pub(super) from_film: bool,
     /// Whether photons are counted.
     pub(super) counts: bool,
+    /// Whether photons are kept for the cone filter.
+    pub(super) keeps: bool,
     /// Whether the CPU tells which rays bodies stop.
     pub(super) bodies: bool,
     pub(super) sampling: Sampling,
@@ -48,11 +51,16 @@ impl FrameShader<'_> {
             self.from_film,
             self.sampling == Sampling::Random,
         );
+        let crossing = match self.march.method {
+            Method::LineOfSight => include_str!("crossing_straight.wgsl"),
+            _ => include_str!("crossing_bent.wgsl"),
+        };
         for part in [
             include_str!("double.wgsl"),
             include_str!("sampler.wgsl"),
             include_str!("start.wgsl"),
             include_str!("exit.wgsl"),
+            crossing,
             &self.technique.text,
         ] {
             text += part;
@@ -74,7 +82,29 @@ impl FrameShader<'_> {
     /// Traces photons and deposits them. The entry point is `photons`.
     pub(super) fn photons(&self) -> String {
         let counts = format!("const COUNTS = {};\n", self.counts);
-        self.light() + &self.film() + &counts + include_str!("photons.wgsl")
+        let keep = if self.keeps {
+            concat!(include_str!("squares.wgsl"), include_str!("keep.wgsl"))
+        } else {
+            "fn keep(slot: u32, at: vec2f, energy: vec3f) {\n}\n"
+        };
+        self.light() + &self.film() + &counts + keep + include_str!("photons.wgsl")
+    }
+
+    /// What kernels over kept photons share.
+    fn squares(&self) -> String {
+        let channels = format!("const CHANNELS = {}u;\n", self.channels);
+        channels + include_str!("frame.wgsl") + include_str!("squares.wgsl")
+    }
+
+    /// Sorts photons that are kept. The entry points are `add_rows`, `begin_squares` and
+    /// `order_photons`, in this order.
+    pub(super) fn sort(&self) -> String {
+        self.squares() + include_str!("sort.wgsl")
+    }
+
+    /// The cone filter of sorted photons. The entry point is `cone`.
+    pub(super) fn cone(&self) -> String {
+        self.squares() + include_str!("cone.wgsl")
     }
 
     /// Traces the corners of a beam's cells. The entry point is `trace_corners`.
@@ -110,8 +140,8 @@ mod tests {
     use super::super::params::FrameParams;
     use super::*;
     use crate::cutoff::{Aperture, ColorWheel, Cutoff, FilterImage, Knife, KnifePosition, Passes};
-    use crate::gpu::Method;
     use crate::gpu::kernel::FieldLayout;
+    use crate::gpu::projection::ProjectionParams;
     use crate::interpolate::Interpolant;
     use crate::media::Volume;
     use crate::optics::{Optics, SourceShape};
@@ -170,7 +200,9 @@ mod tests {
         let mut checked = 0;
         for technique in &techniques() {
             let of_technique = TechniqueShader::new(technique, 1.0).unwrap();
-            for k in 0..8u32 {
+            for k in 0..16u32 {
+                let method = Method::ALL[k as usize % Method::ALL.len()];
+                let is_straight = method == Method::LineOfSight;
                 let source = technique.optics().source_image();
                 let media = FrameMedia {
                     absorption: (k & 1 != 0).then_some(&property),
@@ -183,12 +215,16 @@ mod tests {
                 };
                 let shader = FrameShader {
                     march: Kernel {
-                        method: Method::ALL[(k % 5) as usize],
+                        method,
                         interpolant: Interpolant::BSpline,
                         skip: k == 0,
                         opd: technique.needs_opd(),
                         nodes: k & 1 != 0,
-                        layout: FieldLayout::Slabs(1),
+                        layout: match (is_straight, k < 8) {
+                            (false, _) => FieldLayout::Slabs(1),
+                            (true, false) => FieldLayout::ProjectedAlongAxis,
+                            (true, true) => FieldLayout::ProjectedObliquely,
+                        },
                     },
                     technique: &of_technique,
                     media: (k & 3 != 0).then_some(&media),
@@ -196,6 +232,7 @@ mod tests {
                     tilted_beams: k & 4 != 0,
                     from_film: technique.samples_from_film(),
                     counts: k & 1 != 0,
+                    keeps: k & 4 != 0,
                     bodies: k & 2 != 0,
                     sampling: Sampling::ALL[(k & 1) as usize],
                     source: (k & 4 != 0 || technique.needs_source_points()).then_some(source),
@@ -204,6 +241,8 @@ mod tests {
                     shader.photons(),
                     shader.corners(),
                     shader.triangles(),
+                    shader.sort(),
+                    shader.cone(),
                     shader.filter(k & 1 == 0, 1 + (k as usize >> 1 & 1), k & 2 != 0),
                 ] {
                     let module = parsed(&wgsl);
@@ -212,15 +251,24 @@ mod tests {
                         panic!("{shader:?}: {}", e.emit_to_string(&wgsl));
                     }
                     let named = |name| move |t: &naga::Type| t.name.as_deref() == Some(name);
-                    let frame = module.types.iter().find(|(_, t)| named("Frame")(t)).unwrap().1;
-                    let naga::TypeInner::Struct { span, .. } = frame.inner else {
-                        panic!("Frame is no structure")
-                    };
-                    assert_eq!(span as usize, size_of::<FrameParams>());
+                    for (name, bytes) in [
+                        ("Frame", size_of::<FrameParams>()),
+                        ("Projection", size_of::<ProjectionParams>()),
+                    ] {
+                        let found = module.types.iter().find(|(_, t)| named(name)(t));
+                        let Some((_, found)) = found else {
+                            assert!(name != "Frame", "no Frame");
+                            continue;
+                        };
+                        let naga::TypeInner::Struct { span, .. } = found.inner else {
+                            panic!("{name} is no structure")
+                        };
+                        assert_eq!(span as usize, bytes, "{name}");
+                    }
                     checked += 1;
                 }
             }
         }
-        assert_eq!(checked, (1 + 4 * 10 + 2) * 8 * 4);
+        assert_eq!(checked, (1 + 4 * 10 + 2) * 16 * 6);
     }
 }

@@ -1,9 +1,10 @@
 //! A frame's buffers and kernels on a device, and the submissions of its parts.
 
+use super::cone::ConeOnDevice;
 use super::film::FilmLayout;
 use super::params::FrameParams;
 use super::shader::FrameShader;
-use super::{Job, Light};
+use super::{FrameFilter, Job, Light};
 use crate::film::beams::corner_of_cells;
 use crate::gpu::part_size::{FEWEST_GROUPS, MOST_GROUPS};
 use crate::gpu::paths::DeviceState;
@@ -20,14 +21,14 @@ use wgpu::BufferUsages;
 /// device, and few enough that no driver assumes that the device hangs.
 const PER_SUBMISSION: usize = TILE * FEWEST_GROUPS;
 /// Pixels of a tile, which is a work group.
-const TILE: usize = 64;
+pub(super) const TILE: usize = 64;
 /// Columns and rows of a tile.
-const TILE_SIDES: [u32; 2] = [16, 4];
+pub(super) const TILE_SIDES: [u32; 2] = [16, 4];
 /// Submissions in flight: one is prepared while the device works on the other.
 const IN_FLIGHT: usize = 2;
 
 /// A kernel with what is bound to it.
-type BoundKernel = (wgpu::ComputePipeline, [wgpu::BindGroup; 2]);
+pub(super) type BoundKernel = (wgpu::ComputePipeline, [wgpu::BindGroup; 2]);
 
 /// A frame's buffers and kernels on a device.
 pub(super) struct FrameOnDevice<'a> {
@@ -42,6 +43,8 @@ pub(super) struct FrameOnDevice<'a> {
     kernels: Vec<BoundKernel>,
     /// Kernels that make the picture of the film, and the picture; the same for its noise.
     pictures: Vec<(Vec<BoundKernel>, wgpu::Buffer)>,
+    /// The filter that keeps photons, whose picture comes before the others.
+    cone: Option<ConeOnDevice>,
     in_flight: VecDeque<InFlight>,
     progress: &'a (dyn Fn(u64) + Sync),
 }
@@ -84,6 +87,7 @@ impl<'a> FrameOnDevice<'a> {
             tilted_beams: exposure.tilted_beams,
             from_film,
             counts: layout.has_counts(),
+            keeps: job.keeps().is_some(),
             bodies: exposure.solids.is_some(),
             sampling: exposure.sampling,
             source: needs_source.then(|| optics.source_image()),
@@ -124,6 +128,12 @@ impl<'a> FrameOnDevice<'a> {
         let of_media = || media.iter().flat_map(|(m, _)| m.bindings());
         let mut of_march = vec![(0, march.as_entire_binding())];
         of_march.extend(on_device.field_bindings());
+        let cone = job
+            .keeps()
+            .map(|(photons, _)| {
+                ConeOnDevice::new(&gpu, &shader, layout, &job.framing, &frame, photons)
+            })
+            .transpose()?;
         let mut kernels = Vec::new();
         match job.light {
             Light::Photons { .. } => {
@@ -131,6 +141,7 @@ impl<'a> FrameOnDevice<'a> {
                 let mut own = vec![(0, frame.as_entire_binding()), (1, film.as_entire_binding())];
                 own.extend(image.as_ref().map(|i| (3, i.as_entire_binding())));
                 own.extend(bodies.as_ref().map(|b| (4, b.as_entire_binding())));
+                own.extend(cone.iter().flat_map(ConeOnDevice::bindings));
                 own.extend(of_media());
                 let groups = gpu.bind(&pipeline, [&of_march, &own])?;
                 kernels.push((pipeline, groups));
@@ -155,7 +166,7 @@ impl<'a> FrameOnDevice<'a> {
             }
         }
         let mut pictures = Vec::new();
-        if let Some(weights) = job.filter {
+        if let Some(filter_of_job) = job.filter {
             params.per_photon = match &job.light {
                 Light::Photons { passes } => 1.0 / passes.len() as f32,
                 Light::Beams { .. } => 1.0,
@@ -166,9 +177,18 @@ impl<'a> FrameOnDevice<'a> {
                 let halves = [(passes.len() + 1 - odd) / 2, (passes.len() + odd) / 2];
                 params.per_photon_of_film = halves.map(|n| 1.0 / n.max(1) as f32);
             }
-            for noise in [false, true].into_iter().take(layout.films()) {
+            // The noise of a picture by the cone filter is that of the film, unfiltered.
+            let (weights, wanted): (_, &[bool]) = match filter_of_job {
+                FrameFilter::Weights(weights) => (weights, &[false, true]),
+                FrameFilter::Cone { nearest } => {
+                    params.nearest = nearest;
+                    (&[1.0][..], &[true])
+                }
+            };
+            let has_noise = layout.films() > 1 && !layout.has_counts();
+            for noise in wanted.iter().filter(|noise| !**noise || has_noise) {
                 let buffers = [&frame, &film];
-                pictures.push(filter(paths, &gpu, &shader, layout, (weights, noise), buffers)?);
+                pictures.push(filter(paths, &gpu, &shader, layout, (weights, *noise), buffers)?);
             }
         }
         let (layout, progress) = (*layout, job.progress);
@@ -182,6 +202,7 @@ impl<'a> FrameOnDevice<'a> {
             bodies,
             kernels,
             pictures,
+            cone,
             in_flight,
             progress,
         })
@@ -213,6 +234,7 @@ impl<'a> FrameOnDevice<'a> {
             let count = (tiles - first).min(at_once as u64);
             self.params.first = (first % per_pass) as u32;
             self.params.first_pass = passes.start + (first / per_pass) as u32;
+            self.params.first_photon = (first * TILE as u64) as u32;
             let sent = photons_of(first + count) - photons_of(first);
             if let Some(bodies) = &self.bodies {
                 let place = |tile: u64, lane: u32| {
@@ -318,14 +340,40 @@ impl<'a> FrameOnDevice<'a> {
         Ok(())
     }
 
-    /// Waits for the film and reads its words.
+    /// Sorts the photons that were kept, and filters them: a part of the rows at a time, because a
+    /// pixel without light searches far.
+    fn filter_photons(&mut self, paths: &GpuPaths<'_>) -> Result<(), GpuError> {
+        let Some(cone) = &self.cone else { return Ok(()) };
+        let gpu = Arc::clone(&self.gpu);
+        let across = self.params.width.div_ceil(TILE as u32);
+        let rows = (FEWEST_GROUPS as u32 / across).clamp(1, self.params.height.max(1));
+        for first in (0..self.params.height).step_by(rows as usize) {
+            self.params.first = first;
+            gpu.queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&self.params));
+            paths.work.add_to_device(self.frame.size());
+            let mut commands = gpu.device.create_command_encoder(&Default::default());
+            let sort: &[_] = if first == 0 { &cone.sort } else { &[] };
+            for (kernel, groups) in sort {
+                run(&mut commands, std::slice::from_ref(kernel), &[*groups]);
+            }
+            run(&mut commands, std::slice::from_ref(&cone.filter), &[[across, rows]]);
+            gpu.queue.submit([commands.finish()]);
+            paths.work.add_submission(1 + sort.len() as u64);
+        }
+        Ok(())
+    }
+
+    /// Waits for the film and reads its words: its sums unless only pictures are wanted, then the
+    /// pictures, then the outcomes.
     pub(super) fn read(mut self, paths: &GpuPaths<'_>) -> Result<Vec<u32>, GpuError> {
+        self.filter_photons(paths)?;
         let [first_outcome, outcomes] = self.layout.outcome_bytes();
         let of_picture = self.layout.picture_bytes();
-        let before = match self.pictures.len() {
-            0 => first_outcome,
-            count => count as u64 * of_picture,
-        };
+        let made = self.pictures.iter().map(|(_, picture)| picture);
+        let pictures: Vec<_> = self.cone.iter().map(|c| &c.picture).chain(made).collect();
+        let of_film =
+            if pictures.is_empty() || self.layout.has_counts() { first_outcome } else { 0 };
+        let before = of_film + pictures.len() as u64 * of_picture;
         let bytes = before + outcomes;
         let gpu = Arc::clone(&self.gpu);
         let usage = BufferUsages::MAP_READ | BufferUsages::COPY_DST;
@@ -335,13 +383,14 @@ impl<'a> FrameOnDevice<'a> {
             let groups = [self.params.width.div_ceil(TILE as u32), self.params.height];
             run(&mut commands, kernels, &[groups; 2]);
         }
-        if self.pictures.is_empty() {
-            commands.copy_buffer_to_buffer(&self.film, 0, &readback, 0, before);
-        } else {
+        if !self.pictures.is_empty() {
             paths.work.add_submission(2 * self.pictures.len() as u64);
         }
-        for (n, (_, picture)) in self.pictures.iter().enumerate() {
-            let to = n as u64 * of_picture;
+        if of_film > 0 {
+            commands.copy_buffer_to_buffer(&self.film, 0, &readback, 0, of_film);
+        }
+        for (n, picture) in pictures.iter().enumerate() {
+            let to = of_film + n as u64 * of_picture;
             commands.copy_buffer_to_buffer(picture, 0, &readback, to, of_picture);
         }
         commands.copy_buffer_to_buffer(&self.film, first_outcome, &readback, before, outcomes);
