@@ -55,6 +55,11 @@ impl GasOnCells {
         self.n0
     }
 
+    /// n − 1 of the reference medium.
+    pub(crate) fn reference(&self) -> f64 {
+        self.reference
+    }
+
     /// The cells.
     pub fn cells(&self) -> &CellField {
         &self.cells

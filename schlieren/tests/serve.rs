@@ -207,6 +207,40 @@ fn curves_make_another_index_and_bodies_stay_shut() {
     assert_eq!(s.finished().rgb, density);
 }
 
+/// While the first step is shown, the second is read. It is shown without its file, and read again
+/// if the file has changed.
+#[test]
+fn the_next_step_of_a_series_is_read_ahead() {
+    let s = Server::start_series(&SMALL);
+    let wait_until_read = |step: u64| {
+        let end = std::time::Instant::now() + std::time::Duration::from_secs(60);
+        while s.get("state").json()["read_ahead"] != json!(step) {
+            assert!(std::time::Instant::now() < end, "step {step} is not read");
+            std::thread::sleep(std::time::Duration::from_millis(20));
+        }
+    };
+    let first = s.finished();
+    wait_until_read(1);
+    let [second, kept] = ["flow-1.vti", "kept.vti"].map(|name| s.folder().join(name));
+    std::fs::copy(&second, &kept).unwrap();
+    // The same time and length as when it was read.
+    let written = std::fs::metadata(&second).unwrap().modified().unwrap();
+    let bytes = std::fs::metadata(&second).unwrap().len() as usize;
+    std::fs::write(&second, vec![0; bytes]).unwrap();
+    std::fs::File::options().write(true).open(&second).unwrap().set_modified(written).unwrap();
+    s.change(&json!({"step": 1}));
+    let ahead = s.finished();
+    assert_eq!(ahead.info["error"], serde_json::Value::Null);
+    assert!(changed(&first.rgb, &ahead.rgb) > 0.02);
+
+    // Back, and forth to what has been written since.
+    s.change(&json!({"step": 0}));
+    assert_eq!(s.finished().rgb, first.rgb);
+    std::fs::copy(&kept, &second).unwrap();
+    s.change(&json!({"step": 1}));
+    assert_eq!(s.finished().rgb, ahead.rgb, "the same picture when it is read as it is shown");
+}
+
 #[test]
 fn steps_of_a_series_are_read_when_chosen_and_relative_to_the_first() {
     let s = Server::start_series(&SMALL);

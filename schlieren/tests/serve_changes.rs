@@ -257,13 +257,62 @@ fn a_profile_has_the_deflections_along_its_line() {
 fn frames_have_the_legend_of_their_colours() {
     let s = Server::start(&SMALL);
     let shown = s.finished();
-    let side = shown.info["legend_pixels"].as_u64().unwrap() as usize;
+    let side = shown.info["legend_size"][0].as_u64().unwrap() as usize;
     let at = |column: usize| shown.legend[3 * (side / 2 * side + column)];
     assert!(at(1) < at(side / 2) && at(side / 2) < at(side - 2), "a knife that opens to the right");
     // Undisturbed light has the colour of no deflection, which is beside the middle.
     assert!(shown.rgb[0].abs_diff(at(side / 2)) < 6, "{} {}", shown.rgb[0], at(side / 2));
     s.change(&json!({"technique": {"kind": "shadowgraph"}}));
-    assert_eq!(s.finished().info["legend_pixels"], 0);
+    assert_eq!(s.finished().info["legend_size"], json!([0, 0]));
+    // Several wavelengths add up: colours of deflections, and of the paths of fringes.
+    s.change(&json!({"light": {"wavelengths_nm": [450.0, 550.0, 650.0]},
+        "technique": {"kind": "schlieren"}}));
+    let shown = s.finished();
+    assert_eq!(shown.info["legend_size"], json!([side, side]));
+    let middle = &shown.legend[3 * (side / 2 * side + side / 2)..][..3];
+    assert!(middle.iter().all(|c| c.abs_diff(middle[0]) < 6), "{middle:?}: white light is grey");
+    s.change(&json!({"technique": {"kind": "interferogram"}}));
+    let shown = s.finished();
+    let longest_m = shown.info["legend_path_m"].as_f64().unwrap();
+    assert!((longest_m - 2.6e-6).abs() < 1e-12, "{longest_m}");
+    assert!(shown.legend[..3].iter().all(|c| *c > 240), "{:?}", &shown.legend[..3]);
+    assert_eq!(shown.info["legend_half_rad"], Value::Null);
+}
+
+#[test]
+fn a_profile_has_the_phase_of_fringes_and_the_movement_of_dots() {
+    let s = Server::start(&SMALL);
+    let profile = || {
+        s.finished();
+        let line = json!({"from": [0.0, 0.4], "to": [1.0, 0.4]}).to_string();
+        s.request("POST", "profile", &line).json()
+    };
+    let length = |p: &Value, key: &str| p[key].as_array().unwrap().len();
+    let knife = profile();
+    let points = length(&knife, "deflection_rad");
+    assert_eq!([length(&knife, "waves"), length(&knife, "dots_m")], [0, 0]);
+
+    s.change(&json!({"technique": {"kind": "interferogram"}}));
+    let fringes = profile();
+    assert_eq!([length(&fringes, "waves"), length(&fringes, "dots_m")], [points, 0]);
+    // The path's slope is the deflection, so its sum along the line is the path's difference.
+    let wave = |i: usize| fringes["waves"][i].as_f64().unwrap();
+    let nm = s.get("state").json()["effective"]["light"]["wavelengths_nm"][0].as_f64().unwrap();
+    let step_m = fringes["length_m"].as_f64().unwrap() / (points - 1) as f64;
+    let (from, to) = (20, 160);
+    let right = |p: &Value, i: usize| p["deflection_rad"][i][0].as_f64().unwrap();
+    let sum = (from..to).map(|i| right(&knife, i) * step_m).sum::<f64>();
+    let path_m = (wave(to) - wave(from)) * nm * 1e-9;
+    assert!((path_m - sum).abs() < 0.05 * sum.abs(), "{path_m:e} {sum:e}");
+
+    s.change(&json!({"technique": {"kind": "bos"}, "film": {"focus_m": 0.5}}));
+    let dots = profile();
+    assert_eq!([length(&dots, "waves"), length(&dots, "dots_m")], [0, points]);
+    // A dot moves against the ray, by its angle times the distance: half a metre.
+    let most = (0..points).max_by(|a, b| right(&dots, *a).total_cmp(&right(&dots, *b))).unwrap();
+    let moved = dots["dots_m"][most][0].as_f64().unwrap();
+    let bent = right(&dots, most);
+    assert!((moved + 0.5 * bent).abs() < 0.15 * moved.abs(), "{moved:e} {bent:e}");
 }
 
 #[test]

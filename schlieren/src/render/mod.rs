@@ -26,6 +26,7 @@ mod apparent;
 #[cfg(feature = "gpu")]
 mod device_march;
 mod device_work;
+mod dispersion;
 mod expose;
 pub(crate) mod map;
 mod margin;
@@ -49,6 +50,8 @@ pub use on_gpu::check_gpu;
 pub use paths::{INTERPOLANTS, MARCHES};
 pub use planned::PlannedPaths;
 pub use read_ahead::ReadAhead;
+#[cfg(feature = "serve")]
+pub(crate) use read_ahead::{FileStamp, has_room_beside};
 pub use section::TestSection;
 
 use crate::cutoff::Rgb;

@@ -3,7 +3,9 @@
 
 use super::{RenderError, TestSection};
 use crate::scene::{FlowSpec, MediaSpec, Scene, SolidsSpec};
+use std::path::Path;
 use std::thread::JoinHandle;
+use std::time::SystemTime;
 
 /// Memory that a flow may take beside the one that is drawn, its splines included, as a multiple of
 /// its lattice.
@@ -30,7 +32,26 @@ const TIMES_ITS_LATTICE: u64 = 4;
 pub struct ReadAhead {
     /// The section of the image before.
     kept: Option<(Contents, TestSection)>,
-    next: Option<(Contents, JoinHandle<Result<TestSection, RenderError>>)>,
+    next: Option<Begun>,
+}
+
+/// A section that is being read.
+struct Begun {
+    contents: Contents,
+    stamp: FileStamp,
+    thread: JoinHandle<Result<TestSection, RenderError>>,
+}
+
+/// When a flow was written, and its length: that of its file, or of the file or folder that has it
+/// as one of several times.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct FileStamp(Option<(Option<SystemTime>, u64)>);
+
+impl FileStamp {
+    pub(crate) fn of(path: &Path) -> FileStamp {
+        let found = path.ancestors().find_map(|p| std::fs::metadata(p).ok());
+        FileStamp(found.map(|m| (m.modified().ok(), m.len())))
+    }
 }
 
 /// What a test section is read from.
@@ -55,13 +76,11 @@ impl Contents {
 
 impl ReadAhead {
     /// The test section of a scene: the one that was given back, if it is the same, or the one that
-    /// was begun, or else read now as by [`TestSection::open`].
+    /// was begun, or else read now as by [`TestSection::open`]. What could not be read before, and
+    /// what has been written since, is read now.
     ///
     /// # Errors
     /// As [`TestSection::open`].
-    ///
-    /// # Panics
-    /// If reading it panicked.
     pub fn open(
         &mut self,
         scene: &Scene,
@@ -69,13 +88,12 @@ impl ReadAhead {
     ) -> Result<TestSection, RenderError> {
         let contents = Contents::of(scene);
         let kept = self.kept.take().filter(|k| k.0 == contents);
-        let next = self.next.take_if(|n| n.0 == contents);
-        let mut section = match (kept, next) {
-            (Some((_, section)), _) => section,
-            (None, Some((_, thread))) => {
-                thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?
-            }
-            (None, None) => TestSection::open(scene, read)?.with_caches(),
+        let next = self.next.take_if(|n| n.contents == contents);
+        let next = next.filter(|n| n.stamp == FileStamp::of(&scene.flow.file));
+        let ready = || next.and_then(|n| n.thread.join().ok()?.ok());
+        let mut section = match kept.map(|k| k.1).or_else(ready) {
+            Some(section) => section,
+            None => TestSection::open(scene, read)?.with_caches(),
         };
         section.view = scene.view.direction.view(section.centre_m())?;
         Ok(section)
@@ -87,26 +105,33 @@ impl ReadAhead {
     pub fn begin(&mut self, next: &Scene, drawn: &Scene, section: &TestSection) {
         let contents = Contents::of(next);
         let is_known = |known: &Contents| *known == contents;
-        if is_known(&Contents::of(drawn)) || self.next.as_ref().is_some_and(|n| is_known(&n.0)) {
+        if is_known(&Contents::of(drawn))
+            || self.next.as_ref().is_some_and(|n| is_known(&n.contents))
+        {
             return;
         }
-        let lattice = section.fields.iter().map(|f| f.memory_bytes() as u64).sum::<u64>();
-        if available_bytes().is_some_and(|free| free < TIMES_ITS_LATTICE * lattice) {
+        if !has_room_beside(section) {
             return;
         }
-        let scene = next.clone();
+        let (scene, stamp) = (next.clone(), FileStamp::of(&next.flow.file));
         let thread = std::thread::spawn(move || {
             let section = TestSection::open(&scene, |_| ())?.with_caches();
             section.prepare(&scene);
             Ok(section)
         });
-        self.next = Some((contents, thread));
+        self.next = Some(Begun { contents, stamp, thread });
     }
 
     /// Keeps the section of a scene that was drawn, in case that the next scene has the same.
     pub fn give_back(&mut self, scene: &Scene, section: TestSection) {
         self.kept = Some((Contents::of(scene), section));
     }
+}
+
+/// Whether the memory that is free will hold another section of this size, with its splines.
+pub(crate) fn has_room_beside(section: &TestSection) -> bool {
+    let lattice = section.fields.iter().map(|f| f.memory_bytes() as u64).sum::<u64>();
+    available_bytes().is_none_or(|free| free >= TIMES_ITS_LATTICE * lattice)
 }
 
 /// Memory that programs can still take, where the system tells.
@@ -127,7 +152,7 @@ mod tests {
     use super::*;
     use crate::render::{Control, Layers, render};
     use std::fmt::Write as _;
-    use std::path::{Path, PathBuf};
+    use std::path::PathBuf;
 
     /// A density in waves over a lattice of so many nodes along each axis.
     fn write_flow(folder: &Path, name: &str, amplitude: f64) -> PathBuf {

@@ -5,7 +5,6 @@ use super::deflection_map::DeflectionMap;
 use super::srgb_byte::srgb_byte;
 use crate::cutoff::painted::{Painting, Stroke};
 use crate::cutoff::{Cutoff, CutoffPlane, Rgb};
-use crate::film::Framing;
 use crate::optics::{PlaneVector, SourceImage};
 use crate::render::Map;
 use crate::scene::{CutoffSpec, Scene, SceneError, TechniqueSpec};
@@ -135,37 +134,12 @@ fn histogram(scene: &Scene, map: &Map, half_m: f64) -> (Vec<f32>, f32) {
 /// Deflection, and point on the filter, of the light that lands at a point of the image, for the
 /// middle of the source. `at` is 0..=1 from the image's upper left corner. `None` where no light
 /// lands.
-///
-/// The map is indexed by where rays start, and the image by where they land, which differs out of
-/// focus. A few steps of a fixed-point iteration find the start.
 pub(super) fn traced(
-    map: &Map,
-    framing: &Framing,
+    traced: &DeflectionMap,
     f2_m: f64,
     at: [f64; 2],
 ) -> Option<(PlaneVector, PlaneVector)> {
-    let [w, h] = [framing.width, framing.height];
-    let end_px = [at[0] * f64::from(w), at[1] * f64::from(h)];
-    let pixel = |p: [f64; 2]| {
-        let [x, y] = [
-            p[0].clamp(0.0, f64::from(w - 1)) as usize,
-            p[1].clamp(0.0, f64::from(h - 1)) as usize,
-        ];
-        y * w as usize + x
-    };
-    let mut start = end_px;
-    for _ in 0..4 {
-        let moved = map.displacement_m.get(pixel(start))?;
-        start = [
-            end_px[0] - f64::from(moved[0]) / framing.pixel_m,
-            end_px[1] + f64::from(moved[1]) / framing.pixel_m,
-        ];
-    }
-    let k = pixel(start);
-    if !start.iter().all(|v| v.is_finite()) || *map.transmission.get(k)? <= 0.0 {
-        return None;
-    }
-    let d = *map.deflection_rad.get(k)?;
+    let d = *traced.map.deflection_rad.get(traced.pixel_at(at)?)?;
     Some((d, d.map(|c| (f2_m * f64::from(c)) as f32)))
 }
 
@@ -219,6 +193,7 @@ pub(super) fn as_painting(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::film::Framing;
 
     fn scene(technique: &str) -> Scene {
         Scene::from_toml(&format!("[flow]\nfile = \"a\"\ndensity = \"r\"\n{technique}")).unwrap()
@@ -238,7 +213,7 @@ mod tests {
     #[test]
     fn light_is_where_the_deflection_brings_it() {
         let s = scene("[light]\nsource = { kind = \"point\" }");
-        let traced = DeflectionMap::new(prism([2e-4, -1e-4]), FRAMING);
+        let traced = DeflectionMap::new(prism([2e-4, -1e-4]), FRAMING, false);
         let plane = FilterPlane::new(&s, Some(&traced)).unwrap();
         // f2 = 1.5 m: 0.3 mm to the right, 0.15 mm down.
         let brightest = (0..PIXELS * PIXELS)
@@ -278,15 +253,18 @@ mod tests {
 
     #[test]
     fn a_point_of_the_image_is_followed_back_to_where_its_light_started() {
-        let framing = FRAMING;
+        let of = |map: Map| DeflectionMap::new(map, FRAMING, false);
         let mut map = prism([1e-4, 0.0]);
-        assert_eq!(traced(&map, &framing, 2.0, [0.5, 0.5]), Some(([1e-4, 0.0], [2e-4, 0.0])));
+        assert_eq!(traced(&of(map.clone()), 2.0, [0.5, 0.5]), Some(([1e-4, 0.0], [2e-4, 0.0])));
         // All light lands a pixel to the right of where it starts, so light in column 2 starts in
         // column 1.
         map.displacement_m = vec![[1e-3, 0.0]; 16];
         map.deflection_rad[2 * 4 + 1] = [0.0, 3e-4];
-        assert_eq!(traced(&map, &framing, 2.0, [0.6, 0.6]).unwrap().1, [0.0, 6e-4]);
+        assert_eq!(traced(&of(map.clone()), 2.0, [0.6, 0.6]).unwrap().1, [0.0, 6e-4]);
+        // Rays from the film are known by where they end.
+        let from_film = DeflectionMap::new(map.clone(), FRAMING, true);
+        assert_eq!(traced(&from_film, 2.0, [0.3, 0.6]).unwrap().1, [0.0, 6e-4]);
         map.transmission = vec![0.0; 16];
-        assert_eq!(traced(&map, &framing, 2.0, [0.5, 0.5]), None);
+        assert_eq!(traced(&of(map), 2.0, [0.5, 0.5]), None);
     }
 }

@@ -2,7 +2,7 @@
 
 use super::deflection_map::DeflectionMap;
 use super::filter_plane::{FilterPlane, PIXELS};
-use super::legend::{self, Legend};
+use super::legend::{Legend, Scale};
 use super::srgb_byte::srgb_byte;
 use crate::render::RenderOutput;
 use rayon::prelude::*;
@@ -72,10 +72,12 @@ pub struct FrameInfo {
     pub axes: [[f64; 3]; 3],
     /// Middle of the gas in the flow's coordinates.
     pub flow_center_m: [f64; 3],
-    /// Colours along each side of the legend of deflections; 0 without one.
-    pub legend_pixels: usize,
-    /// Deflection at the middle of each side of the legend.
-    pub legend_half_rad: f64,
+    /// Columns and rows of the legend; 0 without one.
+    pub legend_size: [usize; 2],
+    /// Deflection at the middle of each side of a legend of deflections.
+    pub legend_half_rad: Option<f64>,
+    /// Optical path at the right end of a legend of paths, which begins at 0.
+    pub legend_path_m: Option<f64>,
 }
 
 /// A frame as it is stored and sent.
@@ -115,7 +117,11 @@ impl Frame {
                 (f.half_m, PIXELS, f.outside);
         }
         if let Some(l) = legend {
-            (info.legend_half_rad, info.legend_pixels) = (l.half_rad, legend::SIDE);
+            info.legend_size = l.size;
+            match l.scale {
+                Scale::Deflection { half_rad } => info.legend_half_rad = Some(half_rad),
+                Scale::Path { longest_m } => info.legend_path_m = Some(longest_m),
+            }
         }
         let head = serde_json::to_vec(&info).unwrap_or_default();
         let mut bytes = (head.len() as u32).to_le_bytes().to_vec();

@@ -10,7 +10,7 @@
 //! | `POST /back` | returns to the last scene that was shown |
 //! | `POST /paint` | [`Paint`] |
 //! | `POST /trace` | where the light of a point of the image crosses the filter |
-//! | `POST /profile` | deflections along a line on the image |
+//! | `POST /profile` | deflections along a line on the image; phases, or movements of dots |
 //! | `GET /save/png`, `/save/exr`, `/save/toml`, `/save/sheet` | downloads |
 
 use super::session::{Paint, RefusedChange, SaveKind, Session};

@@ -87,6 +87,8 @@ pub(super) struct Shared {
     settings: BTreeMap<&'static str, TechniqueSettings>,
     /// The scene's flow, and the n0 - 1 of the series that was found for it.
     pub(super) reference: Option<(FlowSpec, f64)>,
+    /// The step that was read last while another one was shown.
+    pub(super) read_ahead: Option<usize>,
 }
 
 /// The state that requests and the rendering thread share.
@@ -133,6 +135,7 @@ impl Session {
             medium: scene.flow.clone(),
             settings: BTreeMap::new(),
             reference: None,
+            read_ahead: None,
         };
         let f = scene.flow;
         let given = [f.density, f.temperature, f.pressure, f.n_minus_1];
@@ -171,6 +174,7 @@ impl Session {
             "file": scene.flow.file.file_name().map(|n| n.to_string_lossy().into_owned()),
             "times": self.steps.iter().map(|s| s.time).collect::<Vec<_>>(),
             "step": self.steps.iter().position(|s| s.path == scene.flow.file),
+            "read_ahead": shared.read_ahead,
             "arrays": self.arrays,
             "overlay": shared.overlay.map(|o| o.style),
             "fit": shared.fitted,

@@ -14,6 +14,7 @@
 
 mod files;
 mod levels;
+mod next_step;
 
 use super::deflection_map::DeflectionMap;
 use super::filter_plane::{FilterPlane, legend_half_rad};
@@ -26,9 +27,10 @@ use crate::film::Framing;
 use crate::input::Outside;
 use crate::path::PathQuantities;
 use crate::render::{self, Control, Layers, Map, RenderError, RenderOutput, TestSection, framing};
-use crate::scene::{FlowSpec, MarchSpec, Scene, ViewSpec};
+use crate::scene::{Device, FlowSpec, MarchSpec, Scene, TechniqueSpec, ViewSpec};
 use crate::solids::Solids;
 use levels::{Level, dots, levels, wanted_samples};
+use next_step::NextStep;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -41,9 +43,10 @@ const INTERACTIVE_SIDES: [u32; 2] = [320, 64];
 /// Time without a change before the error is measured, because measuring cannot be stopped.
 const IDLE_TIME: Duration = Duration::from_millis(500);
 
-/// The parts of a scene that determine deflections.
+/// The parts of a scene that determine deflections, and what is traced with them.
 #[derive(Clone, PartialEq)]
 struct Geometry {
+    with: TracedWith,
     flow: FlowSpec,
     view: ViewSpec,
     wavelengths_nm: Vec<f64>,
@@ -56,6 +59,7 @@ impl Geometry {
         let (f, n) = (&scene.film, f64::NEG_INFINITY);
         let [w, h] = f.size.map(f64::from);
         Geometry {
+            with: TracedWith::of(scene),
             flow: scene.flow.clone(),
             view: scene.view.clone(),
             wavelengths_nm: scene.light.wavelengths_nm.clone(),
@@ -68,6 +72,26 @@ impl Geometry {
                 scene.focus_m(),
             ],
             march: scene.march.clone(),
+        }
+    }
+}
+
+/// What a technique needs of rays besides their deflections.
+#[derive(Clone, Copy, PartialEq)]
+enum TracedWith {
+    Nothing,
+    /// The phase of fringes.
+    Phase,
+    /// The movement of the dots of a background, seen from the film.
+    Dots,
+}
+
+impl TracedWith {
+    fn of(scene: &Scene) -> TracedWith {
+        match scene.technique {
+            TechniqueSpec::Interferogram { .. } => TracedWith::Phase,
+            TechniqueSpec::Bos { .. } => TracedWith::Dots,
+            _ => TracedWith::Nothing,
         }
     }
 }
@@ -93,6 +117,11 @@ pub(super) struct Worker {
     errors: Option<(Geometry, Errors)>,
     serial: u64,
     interactive_side: u32,
+    /// The step that is read ahead, the one that was shown last, and whether it was before the one
+    /// shown earlier.
+    next: Option<NextStep>,
+    step: Option<usize>,
+    backwards: bool,
 }
 
 struct Section {
@@ -100,6 +129,28 @@ struct Section {
     wavelengths_nm: Vec<f64>,
     full: TestSection,
     coarse: Option<TestSection>,
+    /// How differently the light of each wavelength is bent.
+    dispersion: Vec<f64>,
+}
+
+impl Section {
+    /// The section of a flow, without bodies.
+    fn of(flow: &Flow, scene: &Scene) -> Result<Section, RenderError> {
+        let mut full = flow.section(scene, None)?.with_caches();
+        // Cells of a mesh have no coarse lattice.
+        let coarse_fields: Option<Vec<_>> = match full.fields.is_empty() {
+            true => None,
+            false => full.fields.iter().map(super::flow::coarse).collect(),
+        };
+        let coarse = match coarse_fields {
+            Some(fields) => Some(TestSection::of_fields(scene, fields, None)?.with_caches()),
+            None => None,
+        };
+        full.warnings.extend(no_outside(scene, &full));
+        let (flow, wavelengths_nm) = (scene.flow.clone(), scene.light.wavelengths_nm.clone());
+        let dispersion = full.dispersion();
+        Ok(Section { flow, wavelengths_nm, full, coarse, dispersion })
+    }
 }
 
 impl Worker {
@@ -114,6 +165,9 @@ impl Worker {
             errors: None,
             serial: 0,
             interactive_side: INTERACTIVE_SIDES[0],
+            next: None,
+            step: None,
+            backwards: false,
         }
     }
 
@@ -222,6 +276,10 @@ impl Worker {
                 &traced,
             )?;
             last_frame = Some((info, rendered, traced));
+            // A device draws while the CPU reads.
+            if i == last || !level.draft && scene.march.device != Device::Cpu {
+                self.read_ahead(scene);
+            }
             if i < last && self.session.cancel.load(Ordering::Relaxed) {
                 return Ok(false);
             }
@@ -253,27 +311,26 @@ impl Worker {
             if let Some(old) = self.section.take() {
                 self.solids = old.full.solids;
             }
-            if self.flow.file != scene.flow.file {
-                self.flow = Flow::open(&scene.flow.file, &scene.flow.open_options())?;
-            }
             let mut of_series = scene.clone();
             of_series.flow.reference_n_minus_1 = self.reference_n_minus_1(scene)?;
+            let read = self.next.take().and_then(|next| next.take(&of_series));
             // Bodies stay in `self.solids` until nothing can fail any more.
-            let mut full = self.flow.section(&of_series, None)?.with_caches();
-            // Cells of a mesh have no coarse lattice.
-            let coarse_fields: Option<Vec<_>> = match full.fields.is_empty() {
-                true => None,
-                false => full.fields.iter().map(super::flow::coarse).collect(),
+            let mut section = match read {
+                Some((flow, section)) => {
+                    self.flow = flow;
+                    section
+                }
+                None => {
+                    if self.flow.file != scene.flow.file {
+                        self.flow = Flow::open(&scene.flow.file, &scene.flow.open_options())?;
+                    }
+                    Section::of(&self.flow, &of_series)?
+                }
             };
-            let coarse = match coarse_fields {
-                Some(fields) => Some(TestSection::of_fields(scene, fields, None)?.with_caches()),
-                None => None,
-            };
-            full.solids = self.solids.take();
-            full.warnings.extend(no_outside(scene, &full));
-            self.session.found_size(full.size_m());
-            let (flow, wavelengths_nm) = (scene.flow.clone(), scene.light.wavelengths_nm.clone());
-            self.section = Some(Section { flow, wavelengths_nm, full, coarse });
+            section.flow = scene.flow.clone();
+            section.full.solids = self.solids.take();
+            self.session.found_size(section.full.size_m());
+            self.section = Some(section);
         }
         if let Some(s) = &mut self.section {
             let view = scene.view.direction.view(s.full.centre_m())?;
@@ -361,14 +418,17 @@ impl Worker {
         }
         let (scene, draft) = (&level.scene, level.draft);
         let traced = self.with_section(level.coarse, |section| {
-            let planned = section.paths(scene, 0, PathQuantities { opd: false }, false, !draft)?;
+            let opd = geometry.with == TracedWith::Phase;
+            let from_film = geometry.with == TracedWith::Dots;
+            let quantities = PathQuantities { opd };
+            let planned = section.paths(scene, 0, quantities, from_film, !draft)?;
             let framing = framing(scene, section);
             let blocked = |s: &crate::path::Start| {
                 section.solids.as_ref().is_some_and(|b| b.block(&section.view, s))
             };
             let wavelength_m = scene.light.wavelengths_nm[0] * 1e-9;
             let n0 = section.n0(0);
-            let map: Map = render::map::map(
+            let mut map: Map = render::map::map(
                 &*planned.paths,
                 &scene.optics(),
                 &framing,
@@ -378,7 +438,11 @@ impl Worker {
                 &AtomicBool::new(false),
             )
             .ok_or(RenderError::Cancelled)?;
-            Ok::<_, RenderError>(Arc::new(DeflectionMap::new(map, framing)))
+            if from_film {
+                let (shifts_m, transmission) = (&map.displacement_m, &map.transmission);
+                map.apparent_m = render::apparent_displacements(&framing, shifts_m, transmission);
+            }
+            Ok::<_, RenderError>(Arc::new(DeflectionMap::new(map, framing, from_film)))
         })??;
         if !level.draft {
             self.traced = Some((geometry.clone(), traced.clone()));
@@ -414,7 +478,11 @@ impl Worker {
         // Drafts keep the legend that is shown.
         let legend = match info.draft {
             true => None,
-            false => Legend::new(scene, legend_half_rad(scene, traced))?,
+            false => {
+                let section = self.section.as_ref();
+                let dispersion = section.map_or(&[][..], |s| &s.dispersion);
+                Legend::new(scene, legend_half_rad(scene, traced), dispersion)?
+            }
         };
         let (mut axes, mut flow_center_m, mut whole_width_m) = ([[0.0; 3]; 3], [0.0; 3], 0.0);
         if let Some(Section { full, .. }) = &self.section {

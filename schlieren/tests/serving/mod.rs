@@ -46,7 +46,7 @@ pub(crate) struct Server {
     pub(crate) address: String,
     /// `/TOKEN/`.
     pub(crate) base: String,
-    _dir: tempfile::TempDir,
+    dir: tempfile::TempDir,
 }
 
 /// An HTTP response.
@@ -123,7 +123,12 @@ impl Server {
         let answer: Value = serde_json::from_str(&line).expect("the address as JSON");
         let url = answer["url"].as_str().unwrap().strip_prefix("http://").unwrap().to_string();
         let (address, token) = url.split_once('/').unwrap();
-        Server { child, address: address.into(), base: format!("/{token}"), _dir: dir }
+        Server { child, address: address.into(), base: format!("/{token}"), dir }
+    }
+
+    /// The folder with the flow.
+    pub(crate) fn folder(&self) -> &Path {
+        self.dir.path()
     }
 
     pub(crate) fn url(&self) -> String {
@@ -220,7 +225,8 @@ impl DecodedFrame {
         let (n, m) = (3 * size("width") * size("height"), size("filter_pixels").pow(2));
         let rest = &bytes[4 + length..];
         let before = n + 3 * m + 4 * m;
-        assert_eq!(rest.len(), before + 3 * size("legend_pixels").pow(2), "{info}");
+        let legend = |axis: usize| info["legend_size"][axis].as_u64().unwrap() as usize;
+        assert_eq!(rest.len(), before + 3 * legend(0) * legend(1), "{info}");
         let light = rest[n + 3 * m..before]
             .chunks_exact(4)
             .map(|b| f32::from_le_bytes(b.try_into().unwrap()))

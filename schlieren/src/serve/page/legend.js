@@ -24,12 +24,26 @@ function strip(light) {
   context.putImageData(row, 0, 0);
 }
 
-function square({ info, legend }) {
-  const n = info.legend_pixels, small = new OffscreenCanvas(n, n), image = new ImageData(n, n);
-  for (let i = 0; i < n * n; i++) {
+// The colours of a legend on a canvas of their own.
+function colors({ info, legend }) {
+  const [w, h] = info.legend_size, small = new OffscreenCanvas(w, h), image = new ImageData(w, h);
+  for (let i = 0; i < w * h; i++) {
     image.data.set([legend[3 * i], legend[3 * i + 1], legend[3 * i + 2], 255], 4 * i);
   }
   small.getContext("2d").putImageData(image, 0, 0);
+  return small;
+}
+
+// Colours of optical paths, from left to right.
+function paths(frame) {
+  canvas.width = frame.info.legend_size[0];
+  canvas.height = 18;
+  context.imageSmoothingEnabled = false;
+  context.drawImage(colors(frame), 0, 0, canvas.width, canvas.height);
+}
+
+function square(frame) {
+  const { info } = frame, small = colors(frame);
   canvas.width = canvas.height = 128;
   context.imageSmoothingEnabled = true;
   context.drawImage(small, 0, 0, 128, 128);
@@ -53,9 +67,7 @@ const MEANING = {
   schlieren: e => {
     strip(v => v);
     return ["black: no light, white: all of it",
-      e.light.wavelengths_nm.length > 1
-        ? "with several wavelengths there is no legend of deflections: each bends differently"
-        : "the legend of deflections comes with the finished image"];
+      "the legend of deflections comes with the finished image"];
   },
   shadowgraph: e => {
     strip(v => v);
@@ -66,7 +78,7 @@ const MEANING = {
     const visibility = e.technique.visibility, nm = e.light.wavelengths_nm[0];
     if (e.light.wavelengths_nm.length > 1) {
       strip(v => v);
-      return ["with several wavelengths fringes have colours, and no legend"];
+      return ["the legend of the fringes' colours comes with the finished image"];
     }
     strip(v => e.film.exposure * (0.5 + 0.5 * visibility * Math.cos(2 * Math.PI * v)));
     return [`optical path 0 to one wavelength (${short(nm)} nm); then it begins again`];
@@ -86,16 +98,21 @@ export function show(frame, effective, vectors) {
   if (!effective || frame.info.draft) return;
   // Lines along vectors replace the picture, and its colours with it.
   const replaced = vectors === "lic", bos = effective.technique.kind === "bos";
-  const is_square = frame.info.legend_pixels > 0 && !replaced;
+  const { info } = frame, has_colors = info.legend_size[0] > 0 && !replaced;
+  const is_square = has_colors && info.legend_half_rad !== null;
   last = is_square ? frame : null;
+  const nm = effective.light.wavelengths_nm, of_first = nm.length > 1 ? ` at ${short(nm[0])} nm` : "";
   figure.hidden = false;
   canvas.hidden = replaced || bos;
   let lines;
   if (replaced || (vectors && bos)) lines = [VECTORS[vectors]];
   else if (is_square) {
     square(frame);
-    lines = [`colour of each deflection, up to ${quantity(frame.info.legend_half_rad, "rad")} `
-      + "to the right, left, up and down"];
+    lines = [`colour of each deflection${of_first}, up to `
+      + `${quantity(info.legend_half_rad, "rad")} to the right, left, up and down`];
+  } else if (has_colors) {
+    paths(frame);
+    lines = [`optical path${of_first}: 0 to ${quantity(info.legend_path_m, "m")}`];
   } else lines = MEANING[effective.technique.kind](effective);
   words.replaceChildren(...lines.map(l =>
     Object.assign(document.createElement("div"), { textContent: l })));

@@ -12,7 +12,19 @@ const QUANTITIES = {
   up: { name: "deflection, up", unit: "rad", of: p => p.deflection && p.deflection[1] },
   size: { name: "deflection", unit: "rad", of: p => p.deflection && Math.hypot(...p.deflection) },
   light: { name: "brightness", unit: "of white", of: p => p.light },
+  // Only where fringes or dots are shown.
+  phase: { name: "phase", unit: "waves", of: p => p.waves, needs: "waves" },
+  dots_right: { name: "dots, right", unit: "m", of: p => p.dots && p.dots[0], needs: "dots_m" },
+  dots_up: { name: "dots, up", unit: "m", of: p => p.dots && p.dots[1], needs: "dots_m" },
+  dots: { name: "dots", unit: "m", of: p => p.dots && Math.hypot(...p.dots), needs: "dots_m" },
 };
+// A number on an axis, or more exactly below the plot.
+const FORMATS = {
+  "of white": (v, digits) => `${Number((100 * v).toPrecision(digits))} %`,
+  waves: (v, digits) => `${Number(v.toPrecision(digits))} λ`,
+};
+const format = (v, unit, digits = 3) => FORMATS[unit]?.(v, digits) ?? quantity(v, unit, digits);
+const AFTER = { "of white": " of white" };
 let line = { from: [0, 0.5], to: [1, 0.5] }, cursor = 0.5;
 let points = [], length_m = 0, frame = null, active = false, asking = false, again = false;
 // Whether vectors are drawn over the image's brightness.
@@ -73,12 +85,23 @@ async function ask() {
       const n = answer.deflection_rad.length - 1;
       points = answer.deflection_rad.map((deflection, i) => {
         const part = i / n, at = [0, 1].map(c => from[c] + part * (to[c] - from[c]));
-        return { part, at, deflection, light: light(at) };
+        const waves = answer.waves[i] ?? null, dots = answer.dots_m[i] ?? null;
+        return { part, at, deflection, waves, dots, light: light(at) };
       });
+      offer(key => !QUANTITIES[key].needs || answer[QUANTITIES[key].needs].length > 0);
       draw();
     } catch (e) { report(e.message); }
   } while (again);
   asking = false;
+}
+
+// Offers the quantities that the image has.
+function offer(has) {
+  const select = $("quantity"), keys = Object.keys(QUANTITIES).filter(has);
+  if ([...select.options].map(o => o.value).join() === keys.join()) return;
+  const before = select.value;
+  select.replaceChildren(...keys.map(key => new Option(QUANTITIES[key].name, key)));
+  if (keys.includes(before)) select.value = before;
 }
 
 const chosen = () => QUANTITIES[$("quantity").value];
@@ -101,9 +124,7 @@ function draw() {
   const step = round125((high - low) / 3);
   for (let n = Math.ceil(low / step); n * step <= high; n++) {
     rule([PAD.left, Y(n * step)], [PAD.left + width, Y(n * step)]);
-    const percent = `${Number((100 * n * step).toPrecision(3))} %`;
-    const value = unit === "rad" ? quantity(n * step, unit) : percent;
-    context.fillText(value, PAD.left - 4, Y(n * step));
+    context.fillText(format(n * step, unit), PAD.left - 4, Y(n * step));
   }
   context.textAlign = "center";
   context.textBaseline = "top";
@@ -140,12 +161,11 @@ function read() {
   const p = points[Math.round(cursor * (points.length - 1))];
   if (!p) return;
   const { name, of, unit } = chosen(), value = of(p);
-  if (covered && unit !== "rad") {
+  if (covered && unit === "of white") {
     $("profile-here").textContent = "the vectors cover the brightness; choose “vectors” none";
     return;
   }
-  const shown = value === null ? "no light" : unit === "rad" ? quantity(value, unit, 4)
-    : `${Number((100 * value).toPrecision(4))} % of white`;
+  const shown = value === null ? "no light" : format(value, unit, 4) + (AFTER[unit] ?? "");
   $("profile-here").textContent =
     `${name} ${shown} at ${quantity(p.part * length_m, "m", 4)} (${axes.place(p.at)})`;
 }
@@ -166,12 +186,13 @@ canvas.addEventListener("keydown", e => {
   e.preventDefault();
   setCursor(cursor + step / Math.max(1, points.length - 1));
 });
-$("quantity").append(...Object.entries(QUANTITIES).map(([key, q]) => new Option(q.name, key)));
+offer(key => !QUANTITIES[key].needs);
 $("quantity").addEventListener("change", draw);
 $("profile-csv").addEventListener("click", () => {
-  const rows = points.map(p =>
-    [p.part * length_m, ...(p.deflection ?? ["", ""]), p.light ?? ""]);
-  const head = "distance_m,deflection_right_rad,deflection_up_rad,brightness";
+  const rows = points.map(p => [p.part * length_m, ...(p.deflection ?? ["", ""]), p.light ?? "",
+    p.waves ?? "", ...(p.dots ?? ["", ""])]);
+  const head = "distance_m,deflection_right_rad,deflection_up_rad,brightness,phase_waves,"
+    + "dots_right_m,dots_up_m";
   const text = [head, ...rows.map(r => r.join()), ""].join("\n");
   const blob = new Blob([text], { type: "text/csv" });
   keep({ name: "schlieren-profile.csv", blob });

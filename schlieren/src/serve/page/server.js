@@ -76,7 +76,7 @@ function decode(buffer) {
   const filter = take(3 * n);
   const light = new Float32Array(buffer.slice(at, at + 4 * n));
   at += 4 * n;
-  return { info, rgb, filter, light, legend: take(3 * info.legend_pixels ** 2) };
+  return { info, rgb, filter, light, legend: take(3 * info.legend_size[0] * info.legend_size[1]) };
 }
 
 export async function frames(show, lost) {

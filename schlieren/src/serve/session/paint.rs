@@ -82,9 +82,7 @@ impl Session {
                     return Err(refused("the image is not rendered yet; paint when it is shown"));
                 };
                 let f2 = shared.scene.optics().schlieren_focal_length_m;
-                let on_filter = |p: &[f64; 2]| {
-                    traced(&view.map, &view.framing, f2, *p).map(|t| t.1.map(f64::from))
-                };
+                let on_filter = |p: &[f64; 2]| traced(&view, f2, *p).map(|t| t.1.map(f64::from));
                 let points_m: Vec<[f64; 2]> = paint.points.iter().filter_map(on_filter).collect();
                 let dark = paint.points.len() - points_m.len();
                 (points_m, dark)
@@ -131,7 +129,7 @@ impl Session {
         let view: Option<Arc<DeflectionMap>> = shared.frame.as_ref().and_then(|f| f.traced.clone());
         let view = view.ok_or_else(|| refused("the image is not rendered yet"))?;
         let f2 = shared.scene.optics().schlieren_focal_length_m;
-        Ok(traced(&view.map, &view.framing, f2, at))
+        Ok(traced(&view, f2, at))
     }
 }
 

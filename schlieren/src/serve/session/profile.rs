@@ -1,4 +1,4 @@
-//! Deflections along a line on the image.
+//! What light does along a line on the image.
 
 use super::{RefusedChange, Session, refused};
 use crate::serve::filter_plane::traced;
@@ -7,13 +7,18 @@ use serde::Serialize;
 /// Points of a profile.
 const POINTS: usize = 257;
 
-/// Deflections at equal distances along a line.
+/// Quantities at equal distances along a line; nothing where no light lands.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(in crate::serve) struct Profile {
     /// Length of the line in the test section.
     pub(in crate::serve) length_m: f64,
-    /// Deflection to the right and up; nothing where no light lands.
+    /// Deflection to the right and up.
     pub(in crate::serve) deflection_rad: Vec<Option<[f32; 2]>>,
+    /// Optical path difference in waves; empty unless fringes are shown.
+    pub(in crate::serve) waves: Vec<Option<f32>>,
+    /// How far the dots of a background seem to move to the right and up, in metres in the test
+    /// section; empty without dots.
+    pub(in crate::serve) dots_m: Vec<Option<[f32; 2]>>,
 }
 
 impl Session {
@@ -43,8 +48,25 @@ impl Session {
             let t = i as f64 / (POINTS - 1) as f64;
             [0, 1].map(|c| (from[c] + t * (to[c] - from[c])).clamp(0.0, 1.0))
         };
-        let deflection =
-            |i: usize| traced(&view.map, &view.framing, f2_m, point(i)).map(|found| found.0);
-        Ok(Profile { length_m, deflection_rad: (0..POINTS).map(deflection).collect() })
+        let deflection = |i: usize| traced(&view, f2_m, point(i)).map(|found| found.0);
+        let pixels: Vec<_> = (0..POINTS).map(|i| view.pixel_at(point(i))).collect();
+        let map = &view.map;
+        let waves = |k: &Option<usize>| k.and_then(|k| map.waves.get(k).copied());
+        let dots = |k: &Option<usize>| {
+            let moved = k.and_then(|k| map.apparent_m.get(k).copied());
+            moved.filter(|m| m.iter().all(|c| c.is_finite()))
+        };
+        Ok(Profile {
+            length_m,
+            deflection_rad: (0..POINTS).map(deflection).collect(),
+            waves: match map.waves.is_empty() {
+                true => Vec::new(),
+                false => pixels.iter().map(waves).collect(),
+            },
+            dots_m: match map.apparent_m.is_empty() {
+                true => Vec::new(),
+                false => pixels.iter().map(dots).collect(),
+            },
+        })
     }
 }
