@@ -125,6 +125,26 @@ fn values_are_read_along_a_line_and_techniques_are_explained() {
     look(&mut b, "profile");
     b.evaluate("document.getElementById('profile-csv').click()");
     b.wait_for("(document.body.dataset.saved || '').includes('schlieren-profile.csv')");
+    // Fringes have a phase, in several wavelengths colours of paths; dots move.
+    choose(&mut b, "technique", "interferogram");
+    type_into(&mut b, "wavelengths", "450, 550, 650");
+    wait_until_final(&mut b);
+    b.wait_for(
+        "document.getElementById('legend-words').innerText.includes('optical path at 450 nm')",
+    );
+    choose(&mut b, "quantity", "phase");
+    b.wait_for("document.getElementById('profile-here').innerText.match(/phase .* λ at/) !== null");
+    look(&mut b, "phase");
+    choose(&mut b, "technique", "bos");
+    wait_until_final(&mut b);
+    b.wait_for("[...document.getElementById('quantity').options].some(o => o.value === 'dots')");
+    choose(&mut b, "quantity", "dots");
+    b.wait_for("document.getElementById('profile-here').innerText.match(/dots .*m at/) !== null");
+    look(&mut b, "dots");
+    choose(&mut b, "technique", "schlieren");
+    wait_until_final(&mut b);
+    b.wait_for("document.getElementById('legend-words').innerText.includes('at 450 nm, up to')");
+    look(&mut b, "white-light");
     b.evaluate("document.querySelector('input[value=orbit]').click()");
 
     // Each technique says what it is while the pointer is on it, and goes when it leaves.
