@@ -139,8 +139,8 @@ pub struct MeasuredError {
     /// both of the same nodes. Infinite when the field has too few nodes for an estimate.
     pub resolution_rad: f64,
     /// Error of the deflection due to the mesh that the field was resampled from, estimated from
-    /// what the last degree of the polynomials between its points adds. `None` for a field that
-    /// comes from no mesh.
+    /// what the last degree of the polynomials between its points adds, and would add beyond. `None`
+    /// for a field that comes from no mesh.
     pub mesh_rad: Option<f64>,
     /// Number of rays compared.
     pub rays: usize,
@@ -366,7 +366,14 @@ impl Plan {
         let (max_rad, rms_rad, rays) = self.march_error(field, view, &starts, cache);
         let resolution_rad = self.resolution_error(field, view, &starts, cache);
         let mesh_rad = mesh_error::mesh_error(field, view, &starts);
-        (starts, MeasuredError { max_rad, rms_rad, resolution_rad, mesh_rad, rays })
+        let mut error = MeasuredError { max_rad, rms_rad, resolution_rad, mesh_rad, rays };
+        let of_flow_rad = error.of_flow_rad();
+        if let Some(mesh_rad) = &mut error.mesh_rad {
+            let factor = mesh_error::further_degrees(field, view, &starts, of_flow_rad);
+            error.resolution_rad *= factor;
+            *mesh_rad *= factor;
+        }
+        (starts, error)
     }
 
     /// [`Plan::measure`] that reuses what `cache` holds for this field.

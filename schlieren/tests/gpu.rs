@@ -468,6 +468,21 @@ fn films_agree_with_the_cpu() {
     }
 }
 
+/// Single precision knows a path to two millionths: of half a million waves that is a fringe.
+#[test]
+fn fringes_that_single_precision_shifts_are_warned_of() {
+    let Some(_) = gpu() else { return };
+    let rest = "method = \"pefrl\"\n[technique]\nkind = \"interferogram\"";
+    for (scale, warned) in [(1e-4, false), (0.3, true)] {
+        let field = cube(17, |p| scale * lopsided(p) / 1e-3);
+        for device in ["gpu", "cpu"] {
+            let report = rendered(&field, device, rest).unwrap().report;
+            let found = report.warnings.iter().any(|w| w.contains("single precision is off"));
+            assert_eq!(found, warned && device == "gpu", "{scale}, {device}: {report:?}");
+        }
+    }
+}
+
 /// Single rays sample the projection on the CPU, so they are its rays bit for bit. Without a named
 /// march, the plan takes straight rays on the device where the tolerance allows it, and bent ones
 /// where it does not.

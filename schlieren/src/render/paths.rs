@@ -147,7 +147,12 @@ impl TestSection {
         let planned =
             on_gpu(march, field, view, with(mode), measure.then_some(MEASURED_RAYS), caches)?;
         let why_not = match planned {
-            Ok(planned) => {
+            Ok(mut planned) => {
+                if quantities.opd && planned.bend == Bend::Full {
+                    let wavelength_m = scene.light.wavelengths_nm[line] * 1e-9;
+                    let longest_m = cache.derivative_bounds(field).eps * field.size_m().length();
+                    planned.warnings.extend(vague_fringes(longest_m / wavelength_m));
+                }
                 return Ok(self
                     .attenuated(scene, line, view, planned)?
                     .in_image_frame(against_light));
@@ -212,6 +217,23 @@ impl TestSection {
         planned.warnings.extend(skip_warning);
         Ok(self.attenuated(scene, line, view, planned)?.in_image_frame(against_light))
     }
+}
+
+/// Error of optical paths by a full march on a GPU, in single precision, as part of the path.
+const DEVICE_PATH_ERROR: f64 = 2e-6;
+/// Error of a phase that no eye sees, in waves.
+const UNSEEN_WAVES: f64 = 0.1;
+
+/// The warning about fringes of so many waves on a GPU.
+fn vague_fringes(waves: f64) -> Option<String> {
+    let error_waves = DEVICE_PATH_ERROR * waves;
+    (error_waves > UNSEEN_WAVES).then(|| {
+        format!(
+            "optical paths are up to {waves:.1e} waves long, and the GPU's single precision is off \
+             by up to {error_waves:.1} waves of it: fringes may be shifted; compute on the CPU \
+             (--device cpu)"
+        )
+    })
 }
 
 /// A march for comparison.
