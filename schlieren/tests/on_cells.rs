@@ -281,6 +281,26 @@ fn pictures_of_cells_and_of_a_fine_lattice_agree() {
     assert!(cells.report.deflection_error_rad.is_some_and(|e| e < 1e-7));
 }
 
+/// Steps that are finer than the mesh's own error shows would only take longer: four times as long
+/// on a coarse mesh.
+#[test]
+fn steps_in_cells_are_no_finer_than_the_mesh_shows() {
+    let toml = "[flow]\nfile = \"\"\nn_minus_1 = \"n\"\non_cells = true\n[march]\ntolerance_rad = ";
+    for (points, tolerance) in [(9, "1e-9"), (65, "1e-12")] {
+        let scene = Scene::from_toml(&format!("{toml}{tolerance}\n")).unwrap();
+        let gas = gas(&times(hexahedra(points), 30.0), &absolute());
+        let section = TestSection::of_cells(&scene, vec![gas], None).unwrap();
+        let planned = section.paths(&scene, 0, OPD, false, true).unwrap();
+        let of_march = planned.error_rad.unwrap();
+        let of_mesh = planned.mesh_error_rad.unwrap();
+        let told = format!("{points}: {}, {of_march:e}, {of_mesh:e}", planned.description);
+        assert!(planned.description.contains("one step"), "{told}");
+        // A warning names what cannot be had.
+        assert!(planned.warnings.iter().any(|w| w.contains("mesh")), "{:?}", planned.warnings);
+        assert!(of_march <= 0.1 * of_mesh, "{told}");
+    }
+}
+
 #[test]
 fn what_a_lattice_has_is_refused_on_cells() {
     let data = hexahedra(9);

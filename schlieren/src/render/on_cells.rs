@@ -13,6 +13,8 @@ use std::collections::BTreeMap;
 
 /// Numbers of steps in each cell that are tried.
 const STEPS: [u32; 3] = [1, 2, 4];
+/// Part of the mesh's own error below which an error of the march does not show.
+const HIDDEN: f64 = 0.1;
 /// Steps of the rays that measure the error, by those of the plan.
 const FINER: u32 = 4;
 
@@ -27,7 +29,8 @@ pub(super) enum Steps {
     Known(u32),
 }
 
-/// Paths whose error is within the tolerance, if four steps in each cell reach it.
+/// Paths whose error is within the tolerance, if four steps in each cell reach it. More steps than
+/// bring it to a tenth of the mesh's own error would not show.
 pub(super) fn planned(
     gas: &GasOnCells,
     view: View,
@@ -46,6 +49,16 @@ pub(super) fn planned(
             OnCells::new(gas, view, quantities, steps).trace_parallel(&starts, &mut exits);
             exits
         };
+        // Polynomials of another degree differ by the mesh's error; without polynomials, nothing
+        // tells it.
+        let of_mesh = |steps: u32, exits: &[Exit]| {
+            let mut less = vec![Exit::UNDISTURBED; starts.len()];
+            let paths = OnCells::new(gas, view, quantities, steps).with_second_degree();
+            paths.trace_parallel(&starts, &mut less);
+            compare(exits, &less).0
+        };
+        let has_polynomials = gas.cells().has_polynomials();
+        let mut goal_rad = tolerance_rad;
         // Four steps measure one, and are measured themselves.
         let mut traced = BTreeMap::new();
         for tried in STEPS {
@@ -54,17 +67,17 @@ pub(super) fn planned(
             }
             let (max_rad, _, _) = compare(&traced[&tried], &traced[&(FINER * tried)]);
             (steps, error_rad) = (tried, Some(max_rad));
-            if max_rad <= tolerance_rad {
+            if has_polynomials && tolerance_rad > 0.0 {
+                let mesh_rad = of_mesh(steps, &traced[&steps]);
+                mesh_error_rad = Some(mesh_rad);
+                goal_rad = (tolerance_rad - mesh_rad).max(HIDDEN * mesh_rad);
+            }
+            if max_rad <= goal_rad {
                 break;
             }
         }
-        // Polynomials of another degree differ by the mesh's error; without polynomials, nothing
-        // tells it.
-        if gas.cells().has_polynomials() {
-            let mut exits = vec![Exit::UNDISTURBED; starts.len()];
-            let paths = OnCells::new(gas, view, quantities, steps).with_second_degree();
-            paths.trace_parallel(&starts, &mut exits);
-            mesh_error_rad = Some(compare(&traced[&steps], &exits).0);
+        if has_polynomials && mesh_error_rad.is_none() {
+            mesh_error_rad = Some(of_mesh(steps, &traced[&steps]));
         }
     }
     let paths = OnCells::new(gas, view, quantities, steps);
