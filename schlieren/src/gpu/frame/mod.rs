@@ -53,6 +53,9 @@ pub(crate) enum NotExposed {
     Refused(String),
 }
 
+/// Counts of photons, and the picture of a cone filter if there is one: brightness of each pixel.
+pub(crate) type CountedFilms<const C: usize> = (Tally, Option<Vec<[f32; C]>>);
+
 /// How a film is exposed.
 #[derive(Debug, Clone)]
 enum Light {
@@ -130,7 +133,7 @@ impl GpuPaths<'_> {
         cone: Option<u32>,
         cancel: &AtomicBool,
         progress: &(dyn Fn(u64) + Sync),
-    ) -> Result<(Tally, Option<Vec<[f32; C]>>), NotExposed> {
+    ) -> Result<CountedFilms<C>, NotExposed> {
         let layout = FilmLayout::of(films);
         let light = Light::Photons { passes };
         let framing = *films[0].framing();

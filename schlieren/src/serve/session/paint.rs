@@ -82,7 +82,7 @@ impl Session {
                     return Err(refused("the image is not rendered yet; paint when it is shown"));
                 };
                 let f2 = shared.scene.optics().schlieren_focal_length_m;
-                let on_filter = |p: &[f64; 2]| traced(&view, f2, *p).map(|t| t.1.map(f64::from));
+                let on_filter = |p: &[f64; 2]| traced(view, f2, *p).map(|t| t.1.map(f64::from));
                 let points_m: Vec<[f64; 2]> = paint.points.iter().filter_map(on_filter).collect();
                 let dark = paint.points.len() - points_m.len();
                 (points_m, dark)
