@@ -139,8 +139,8 @@ pub struct MeasuredError {
     /// both of the same nodes. Infinite when the field has too few nodes for an estimate.
     pub resolution_rad: f64,
     /// Error of the deflection due to the mesh that the field was resampled from, estimated from
-    /// what the last degree of the polynomials between its points adds, and would add beyond. `None`
-    /// for a field that comes from no mesh.
+    /// what the last degree of the polynomials between its points adds, and those beyond would.
+    /// `None` for a field that comes from no mesh.
     pub mesh_rad: Option<f64>,
     /// Number of rays compared.
     pub rays: usize,

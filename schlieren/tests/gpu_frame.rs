@@ -6,125 +6,19 @@
 
 mod common;
 mod device;
+mod frames;
 
 use common::{cube, lopsided};
+use frames::{
+    BEAMS, KNIFE, NO_FILTER, PHOTONS, both, changed, check_device, difference, exposed,
+    exposed_through_smoke, has_gpu, marched, scene, techniques,
+};
 use glam::DVec3;
 use schlieren::field::{Field, Node};
 use schlieren::media::{Media, Property, Volume};
 use schlieren::render::{Control, Layers, RenderOutput, TestSection, render};
-use schlieren::scene::Scene;
 use schlieren::solids::Solids;
 use std::sync::atomic::{AtomicBool, Ordering};
-
-/// Whether there is a device. Without one, prints why the test is skipped.
-fn has_gpu() -> bool {
-    device::gpu().is_some()
-}
-
-const PHOTONS: &str = "[sampling]\nmethod = \"photons\"\nsamples = 4\nseed = 77\n";
-const BEAMS: &str = "[sampling]\nmethod = \"beams\"\ncells_per_side = 2\n";
-const NO_FILTER: &str = "[sampling.filter]\nkind = \"none\"\n";
-
-fn scene(device: &str, film: &str, rest: &str) -> Scene {
-    marched(device, film, ["verlet", "b-spline"], rest)
-}
-
-fn marched(device: &str, film: &str, [march, interpolant]: [&str; 2], rest: &str) -> Scene {
-    let toml = format!(
-        "[flow]\nfile = \"\"\ndensity = \"-\"\n[film]\nsize = [41, 30]\n{film}[march]\ndevice = \
-         \"{device}\"\nmethod = \"{march}\"\ninterpolant = \"{interpolant}\"\nstep_voxels = \
-         1.0\n{rest}"
-    );
-    Scene::from_toml(&toml).unwrap_or_else(|e| panic!("{toml}: {e}"))
-}
-
-fn exposed(field: &Field, scene: &Scene) -> RenderOutput {
-    let section = TestSection::of_fields(scene, vec![field.clone()], None).unwrap();
-    let layers = Layers { counts: true, noise: true, ..Layers::NONE };
-    render(scene, &section, layers, &Control::default()).unwrap()
-}
-
-/// As [`exposed`], through smoke in waves that turns the light's polarisation. Their lattices are
-/// not that of the field.
-fn exposed_through_smoke(field: &Field, scene: &Scene) -> RenderOutput {
-    let wave = |p: DVec3| (3.0 * p.x - 2.0 * p.y + 4.0 * p.z).sin();
-    let volume = |n: usize, scale: f64, offset: f64| {
-        let spacing_m = field.size_m() * 1.2 / (n - 1) as f64;
-        let low = field.origin_m() - 0.1 * field.size_m();
-        let value = |p: DVec3| offset + scale * wave(p - field.origin_m());
-        Volume::from_fn([n; 3], spacing_m.to_array(), low, value).unwrap()
-    };
-    let media = Media::default()
-        .with(Property::Absorption, volume(19, 0.3, 0.4))
-        .with(Property::Rotation, volume(40, 2.0, -0.5));
-    let section = TestSection::of_fields(scene, vec![field.clone()], None).unwrap();
-    render(scene, &section.with_media(media), Layers::NONE, &Control::default()).unwrap()
-}
-
-/// The frames of the GPU and of the CPU. The GPU must have exposed its own.
-fn both(field: &Field, film: &str, rest: &str) -> [RenderOutput; 2] {
-    let [gpu, cpu] = ["gpu", "cpu"].map(|d| exposed(field, &scene(d, film, rest)));
-    check_device(&gpu, &cpu, rest);
-    [gpu, cpu]
-}
-
-/// Checks that the GPU has exposed its frame, and that the same light arrived.
-fn check_device(gpu: &RenderOutput, cpu: &RenderOutput, rest: &str) {
-    let device = gpu.report.device.expect("the work of the device");
-    let tally = gpu.report.tally;
-    assert_eq!(device.photons, tally.sent, "{rest}: {:?}", gpu.report.warnings);
-    assert!(gpu.report.device.is_some() && cpu.report.device.is_none());
-    assert_eq!(tally.sent, cpu.report.tally.sent, "{rest}");
-    let stopped = |o: &RenderOutput| [o.report.tally.blocked_in_field, o.report.tally.turned];
-    assert_eq!(stopped(gpu), stopped(cpu), "{rest}");
-    assert_eq!(tally.not_a_number, 0);
-}
-
-/// Number of pixels of which a channel differs by more than is allowed.
-fn changed(a: &RenderOutput, b: &RenderOutput, allowed: f32) -> usize {
-    let off = |(a, b): &(&[f32; 3], &[f32; 3])| (0..3).any(|c| (a[c] - b[c]).abs() > allowed);
-    a.pixels.iter().zip(&b.pixels).filter(off).count()
-}
-
-/// Largest difference of the two images, and the largest brightness.
-fn difference(a: &RenderOutput, b: &RenderOutput) -> [f32; 2] {
-    let mut worst = [0.0f32; 2];
-    for (a, b) in a.pixels.iter().zip(&b.pixels) {
-        for c in 0..3 {
-            assert!(a[c].is_finite());
-            worst = [worst[0].max((a[c] - b[c]).abs()), worst[1].max(b[c])];
-        }
-    }
-    worst
-}
-
-const KNIFE: &str = "[technique]\nkind = \"schlieren\"\n[technique.cutoff]\nkind = \"knife\"\n";
-
-/// The scenes: technique, cut-off and source of each.
-fn techniques() -> Vec<(&'static str, String)> {
-    let schlieren =
-        |cutoff: &str| format!("[technique]\nkind = \"schlieren\"\n[technique.cutoff]\n{cutoff}");
-    let disc = "[light.source]\nkind = \"circle\"\ndiameter_m = 2e-3\n";
-    let slit = "[light.source]\nkind = \"slit\"\nwidth_m = 1e-3\nlength_m = 2e-3\nangle_deg = \
-                20.0\n";
-    vec![
-        ("knife", KNIFE.to_string()),
-        ("knife before a turned slit", KNIFE.to_string() + slit),
-        ("knife before a disc", KNIFE.to_string() + disc),
-        ("circle", schlieren("kind = \"circle\"\nradius_m = 1e-3\n") + disc),
-        ("circle before a slit", schlieren("kind = \"circle\"\nradius_m = 4e-4\n")),
-        ("dark field", schlieren("kind = \"complemented-circle\"\nradius_m = 1e-3\n") + disc),
-        ("colours", schlieren("kind = \"color\"\nradius_m = 2e-3\n")),
-        ("interferogram", "[technique]\nkind = \"interferogram\"\n".into()),
-        (
-            "finite fringes",
-            "[technique]\nkind = \"interferogram\"\nfringe_spacing_m = 0.05\nvisibility = 0.7\n"
-                .into(),
-        ),
-        ("dots", "[technique]\nkind = \"bos\"\nseed = 5\n".into()),
-        ("shadowgraph", "[technique]\nkind = \"shadowgraph\"\n".into()),
-    ]
-}
 
 /// Photons land in other pixels where their positions differ by a rounding, and step functions
 /// (sampled sources, dots) switch. Each such photon changes a pixel by its energy; without filter
@@ -390,74 +284,6 @@ fn only_pixels_come_back_and_each_part_of_a_frame_is_submitted_once() {
     assert_eq!(picture.bytes_from_device, 41 * 30 * 4 + 56 + 4096 * 32);
 }
 
-/// The page asks for the noise of each of its frames.
-#[test]
-fn the_noise_of_a_picture_comes_back_with_it_and_not_the_film() {
-    if !has_gpu() {
-        return;
-    }
-    let field = cube(17, lopsided);
-    let color = "[technique]\nkind = \"schlieren\"\n[technique.cutoff]\nkind = \
-                 \"color\"\nradius_m = 2e-3\n[light.source]\nkind = \"point\"\n";
-    for (technique, channels) in [(KNIFE, 1), (color, 3)] {
-        for samples in [2, 7] {
-            let rest =
-                format!("{technique}[sampling]\nmethod = \"photons\"\nsamples = {samples}\n");
-            let [gpu, cpu] = ["gpu", "cpu"].map(|d| {
-                let scene = scene(d, "", &rest);
-                let section = TestSection::of_fields(&scene, vec![field.clone()], None).unwrap();
-                let layers = Layers { noise: true, ..Layers::NONE };
-                render(&scene, &section, layers, &Control::default()).unwrap()
-            });
-            let work = gpu.report.device.unwrap();
-            let pixels = 2 * 4 * 41 * 30 * channels;
-            assert_eq!(work.bytes_from_device, pixels + 56 + 4096 * 32, "{work:?}");
-            assert!(difference(&gpu, &cpu)[0] < 2e-5);
-            let [on_gpu, on_cpu] = [&gpu, &cpu].map(|r| r.noise.as_ref().unwrap());
-            let pairs = || on_gpu.iter().zip(on_cpu);
-            let worst = pairs().map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
-            let largest = on_cpu.iter().copied().fold(0.0, f32::max);
-            assert!(worst < 2e-5 && largest > 1e-3, "{samples}: {worst:e} of {largest:e}");
-        }
-    }
-}
-
-/// The filters of the device are those of the CPU, also where they reach over the image's edge.
-#[test]
-fn pictures_are_filtered_on_the_device_as_on_the_cpu() {
-    if !has_gpu() {
-        return;
-    }
-    let field = cube(24, lopsided);
-    let color = "[technique]\nkind = \"schlieren\"\n[technique.cutoff]\nkind = \
-                 \"color\"\nradius_m = 2e-3\n";
-    let source = "[light.source]\nkind = \"point\"\n";
-    for technique in [KNIFE.to_string(), format!("{color}{source}")] {
-        for filter in [
-            "kind = \"gaussian\"\nsigma_px = 1.7",
-            "kind = \"gaussian\"\nsigma_px = 30.0",
-            "kind = \"mean\"\nradius_px = 2.4",
-            "kind = \"none\"",
-            "kind = \"cone\"\nnearest = 2",
-            "kind = \"cone\"\nnearest = 8",
-            "kind = \"cone\"\nnearest = 600",
-            "kind = \"cone\"\nnearest = 10000",
-        ] {
-            let rest = format!("{technique}{PHOTONS}[sampling.filter]\n{filter}\n");
-            let [gpu, cpu] = ["gpu", "cpu"].map(|d| {
-                let scene = scene(d, "", &rest);
-                let section = TestSection::of_fields(&scene, vec![field.clone()], None).unwrap();
-                render(&scene, &section, Layers::NONE, &Control::default()).unwrap()
-            });
-            assert_eq!(gpu.report.warnings, cpu.report.warnings, "{filter}");
-            assert_eq!(gpu.report.tally, cpu.report.tally, "{filter}");
-            assert_eq!(gpu.report.counters, cpu.report.counters, "{filter}");
-            let [worst, brightest] = difference(&gpu, &cpu);
-            assert!(brightest > 0.3 && worst < 2e-5, "{filter}: {worst:e} of {brightest}");
-        }
-    }
-}
-
 /// The sums of integers do not depend on the order in which photons arrive.
 #[test]
 fn a_frame_has_the_same_bits_in_every_run() {
@@ -551,41 +377,6 @@ fn what_the_device_cannot_expose_is_named_and_exposed_by_the_cpu() {
     assert_eq!([named(&gpu), named(&cpu)], [1, 0], "{:?}", gpu.report.warnings);
     assert_eq!(gpu.report.device.unwrap().photons, 0);
     assert_eq!(gpu.report.tally.sent, cpu.report.tally.sent);
-}
-
-/// Photons are few in shadows and beyond the film's edge, many in a focus, and none where a body
-/// takes the whole film: pixels find the nearest wherever they are. Counts and noise come back as
-/// without the filter.
-#[test]
-fn the_cone_filter_finds_photons_in_shadows_and_foci_on_the_device() {
-    if !has_gpu() {
-        return;
-    }
-    let lens = cube(24, |p| -4e-3 * (p.x * p.x + p.y * p.y));
-    let thrown_out = cube(24, |p| 2e-3 * p.x);
-    let body = device::with_body(24);
-    let shadowgraph = "[technique]\nkind = \"shadowgraph\"\n";
-    for (name, field, film) in [
-        ("focus", &lens, "focus_m = 60.0\n"),
-        ("beyond the edge", &thrown_out, "focus_m = 150.0\n"),
-        ("shadow", &body, ""),
-        ("a corner of the shadow", &body, "field_of_view_m = 0.02\n"),
-    ] {
-        for nearest in [3, 40] {
-            let filter = format!("[sampling.filter]\nkind = \"cone\"\nnearest = {nearest}\n");
-            let [gpu, cpu] = both(field, film, &format!("{shadowgraph}{PHOTONS}{filter}"));
-            let [worst, brightest] = difference(&gpu, &cpu);
-            assert!(worst <= 5e-5 * brightest, "{name}, {nearest}: {worst:e} of {brightest}");
-            let [a, b] = [&gpu, &cpu].map(|o| o.counts.clone().expect("counts"));
-            let others = a.iter().zip(&b).filter(|(a, b)| a != b).count();
-            assert!(others <= 4, "{name}: {others} pixels have other numbers of photons");
-            assert!(gpu.noise.is_some() == cpu.noise.is_some(), "{name}");
-            assert_eq!(gpu.report.warnings, cpu.report.warnings, "{name}");
-            let again =
-                exposed(field, &scene("gpu", film, &format!("{shadowgraph}{PHOTONS}{filter}")));
-            assert_eq!(again.pixels, gpu.pixels, "{name}: other bits in the next run");
-        }
-    }
 }
 
 /// Cancelling ends a frame between two submissions.

@@ -1,9 +1,7 @@
 //! A field that is projected along the light on the device: the maps that straight rays sample.
 
 use super::kernel::{FIRST_SLAB, FieldLayout, PROJECTION};
-use super::volume::{DeviceVolume, Values, packed};
 use super::{Gpu, GpuError};
-use crate::field::Node;
 use crate::march::{LineOfSight, ProjectedMap};
 use bytemuck::{Pod, Zeroable};
 use wgpu::{BindingResource, BufferUsages};
@@ -45,28 +43,11 @@ impl ProjectionParams {
 }
 
 impl DeviceProjection {
-    pub(super) fn layout(&self) -> FieldLayout {
-        if self.coefficients.len() == 1 {
-            FieldLayout::ProjectedAlongAxis
-        } else {
-            FieldLayout::ProjectedObliquely
-        }
-    }
-
-    /// What a kernel binds.
-    pub(super) fn bindings(&self) -> Vec<(u32, BindingResource<'_>)> {
-        let maps = (FIRST_SLAB..).zip(&self.coefficients);
-        let all = std::iter::once((PROJECTION, &self.numbers)).chain(maps);
-        all.map(|(i, b)| (i, b.as_entire_binding())).collect()
-    }
-}
-
-impl DeviceVolume {
     /// Uploads the maps of a projection.
     ///
     /// # Errors
     /// If they do not fit a binding of the device, or it fails.
-    pub(super) fn projected(gpu: &Gpu, sight: &LineOfSight) -> Result<DeviceVolume, GpuError> {
+    pub(super) fn new(gpu: &Gpu, sight: &LineOfSight) -> Result<DeviceProjection, GpuError> {
         let (map, exit_depth_m) = sight.projection();
         let (need, available) = (size_of_val(&map.coefficients[..]) as u64, gpu.binding_bytes());
         if need > available {
@@ -91,18 +72,27 @@ impl DeviceVolume {
         let coefficients = maps
             .map(|m| gpu.upload(bytemuck::cast_slice(m)))
             .collect::<Result<Vec<_>, GpuError>>()?;
-        let kinds = map.kinds.as_ref().map(|kinds| {
-            let node = |k: &u8| match k {
-                0 => Node::Gas,
-                1 => Node::Blank,
-                _ => Node::Solid,
-            };
-            packed(&kinds.iter().map(node).collect::<Vec<_>>())
-        });
-        let kinds = kinds.map(|k| gpu.upload(bytemuck::cast_slice(&k))).transpose()?;
-        let all = [&numbers].into_iter().chain(&coefficients).chain(&kinds);
-        let bytes = all.map(wgpu::Buffer::size).sum();
-        let values = Values::Projection(DeviceProjection { numbers, coefficients });
-        Ok(DeviceVolume { values, kinds, bricks: None, stride: [map.row, 0], layers: 0, bytes })
+        Ok(DeviceProjection { numbers, coefficients })
+    }
+
+    /// Memory in bytes.
+    pub(super) fn bytes(&self) -> u64 {
+        let all = std::iter::once(&self.numbers).chain(&self.coefficients);
+        all.map(wgpu::Buffer::size).sum()
+    }
+
+    pub(super) fn layout(&self) -> FieldLayout {
+        if self.coefficients.len() == 1 {
+            FieldLayout::ProjectedAlongAxis
+        } else {
+            FieldLayout::ProjectedObliquely
+        }
+    }
+
+    /// What a kernel binds.
+    pub(super) fn bindings(&self) -> Vec<(u32, BindingResource<'_>)> {
+        let maps = (FIRST_SLAB..).zip(&self.coefficients);
+        let all = std::iter::once((PROJECTION, &self.numbers)).chain(maps);
+        all.map(|(i, b)| (i, b.as_entire_binding())).collect()
     }
 }

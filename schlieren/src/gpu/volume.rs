@@ -6,7 +6,7 @@ use super::kernel::{FIRST_SLAB, FieldLayout};
 use super::projection::DeviceProjection;
 use super::rows::{self, Rows};
 use super::{Gpu, GpuError};
-use crate::field::Field;
+use crate::field::{Field, Node};
 use crate::interpolate::{BSpline, Interpolant, TrilinearGradient};
 use crate::march::{FieldCache, LineOfSight};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -253,6 +253,27 @@ impl DeviceVolume {
     }
 }
 
+impl DeviceVolume {
+    /// Uploads the field's projection along the light.
+    ///
+    /// # Errors
+    /// If it does not fit, or the device fails.
+    pub(super) fn projected(gpu: &Gpu, sight: &LineOfSight) -> Result<DeviceVolume, GpuError> {
+        let projection = DeviceProjection::new(gpu, sight)?;
+        let map = sight.projection().0;
+        let node = |kind: &u8| match kind {
+            0 => Node::Gas,
+            1 => Node::Blank,
+            _ => Node::Solid,
+        };
+        let kinds = map.kinds.as_ref().map(|k| packed(&k.iter().map(node).collect::<Vec<_>>()));
+        let kinds = kinds.map(|k| gpu.upload(bytemuck::cast_slice(&k))).transpose()?;
+        let bytes = projection.bytes() + kinds.as_ref().map_or(0, wgpu::Buffer::size);
+        let values = Values::Projection(projection);
+        Ok(DeviceVolume { values, kinds, bricks: None, stride: [map.row, 0], layers: 0, bytes })
+    }
+}
+
 /// Number of slabs and layers of cells in each, so that every slab fits a binding. The last slab
 /// may have fewer layers. `None` if this needs more than `most` slabs.
 fn cut(
@@ -271,10 +292,8 @@ fn cut(
 }
 
 /// Packs two bits per node, sixteen nodes per word.
-pub(super) fn packed(nodes: &[crate::field::Node]) -> Vec<u32> {
-    let word = |w: &[crate::field::Node]| {
-        w.iter().enumerate().fold(0, |a, (i, n)| a | (*n as u32) << (2 * i))
-    };
+fn packed(nodes: &[Node]) -> Vec<u32> {
+    let word = |w: &[Node]| w.iter().enumerate().fold(0, |a, (i, n)| a | (*n as u32) << (2 * i));
     nodes.chunks(16).map(word).collect()
 }
 
@@ -285,7 +304,6 @@ fn bytes_of(bytes: u64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::field::Node;
 
     #[test]
     fn slabs_hold_all_cells_and_no_more_than_a_binding() {

@@ -5,8 +5,8 @@
 //! ([`datasets::resample::ResampledField::truncation`]). Rays through this difference, taken for a
 //! gas, are bent by the difference of deflections. For thirty gases on two meshes and in two views
 //! (bench's experiment `accuracy-tolerance`), errors are no larger than that difference and the
-//! lattice's error together, where the mesh resolves the flow. Where it hardly does, as a shock that
-//! is steeper than the cells are wide, further degrees would add more: [`further_degrees`].
+//! lattice's error together, where the mesh resolves the flow. Where it hardly does, as a shock
+//! that is steeper than the cells are wide, further degrees would add more: [`further_degrees`].
 
 use super::RESOLUTION_STEP;
 use crate::field::Field;

@@ -1,9 +1,9 @@
 //! The cone filter on the device: photons are kept, sorted by pixels, and searched for the nearest
 //! to each pixel.
 
+use super::bound_kernel::BoundKernel;
 use super::film::FilmLayout;
 use super::shader::FrameShader;
-use super::submissions::BoundKernel;
 use crate::film::Framing;
 use crate::gpu::{Gpu, GpuError};
 use wgpu::{BindingResource, BufferUsages};

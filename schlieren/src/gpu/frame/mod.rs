@@ -20,9 +20,11 @@
 //! | film.rs, film.wgsl | the sums |
 //! | cone.rs, squares.wgsl, keep.wgsl, sort.wgsl, cone.wgsl | the cone filter, which keeps photons |
 //! | filter*.wgsl | brightness and its filter, unless more than the picture is wanted |
+//! | bound_kernel.rs | a kernel with its buffers |
 //! | submissions.rs | buffers and kernels on a device, and the parts of a frame |
 //! | shader.rs | the shaders, assembled from what a scene needs |
 
+mod bound_kernel;
 mod cone;
 mod film;
 mod media;

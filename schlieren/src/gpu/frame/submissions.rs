@@ -1,5 +1,6 @@
 //! A frame's buffers and kernels on a device, and the submissions of its parts.
 
+use super::bound_kernel::{BoundKernel, run};
 use super::cone::ConeOnDevice;
 use super::film::FilmLayout;
 use super::params::FrameParams;
@@ -26,9 +27,6 @@ pub(super) const TILE: usize = 64;
 pub(super) const TILE_SIDES: [u32; 2] = [16, 4];
 /// Submissions in flight: one is prepared while the device works on the other.
 const IN_FLIGHT: usize = 2;
-
-/// A kernel with what is bound to it.
-pub(super) type BoundKernel = (wgpu::ComputePipeline, [wgpu::BindGroup; 2]);
 
 /// A frame's buffers and kernels on a device.
 pub(super) struct FrameOnDevice<'a> {
@@ -431,17 +429,6 @@ fn filter(
         Ok::<_, GpuError>((pipeline, groups))
     };
     Ok((vec![bind(true)?, bind(false)?], pixels))
-}
-
-/// Records kernels with these numbers of work groups.
-fn run(commands: &mut wgpu::CommandEncoder, kernels: &[BoundKernel], groups: &[[u32; 2]]) {
-    let mut pass = commands.begin_compute_pass(&Default::default());
-    for ((pipeline, bound), [x, y]) in kernels.iter().zip(groups) {
-        pass.set_pipeline(pipeline);
-        pass.set_bind_group(0, &bound[0], &[]);
-        pass.set_bind_group(1, &bound[1], &[]);
-        pass.dispatch_workgroups(*x, *y, 1);
-    }
 }
 
 /// One bit for each of so many rays, from the lowest of the first word.
