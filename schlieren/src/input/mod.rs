@@ -19,6 +19,7 @@ mod media;
 mod medium;
 mod nodes;
 mod on_cells;
+mod planes;
 mod plausible;
 mod reference;
 mod series;
@@ -267,7 +268,18 @@ const MOST_N_MINUS_1: f64 = 100.0;
 
 /// Reads a file as a field. For a time series this reads the first time; see [`series`] for the
 /// others.
+///
+/// A large volume of one array (NRRD, MetaImage, raw: more than 2^27 nodes) of which fewer nodes are
+/// wanted is read plane by plane, as averages.
 pub fn load(path: &Path, options: &Options) -> Result<LoadedField, InputError> {
+    if let Some((data, warnings)) = planes::averaged(path, options)? {
+        // Averages are the lattice that was wanted.
+        let options = Options { resolution: Resolution::Auto, ..options.clone() };
+        let mut loaded = from_dataset(&data, &options)
+            .map_err(|e| InputError::InFile { path: path.to_path_buf(), source: Box::new(e) })?;
+        loaded.report.warnings.splice(0..0, warnings);
+        return Ok(loaded);
+    }
     let (mut loaded, warnings) =
         with_data(path, &options.file, |data| from_dataset(data, options))?;
     loaded.report.warnings.splice(0..0, warnings);

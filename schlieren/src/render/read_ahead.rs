@@ -2,6 +2,7 @@
 //! image has the same.
 
 use super::{RenderError, TestSection};
+use crate::free_memory::available_bytes;
 use crate::scene::{FlowSpec, MediaSpec, Scene, SolidsSpec};
 use std::path::Path;
 use std::thread::JoinHandle;
@@ -10,6 +11,9 @@ use std::time::SystemTime;
 /// Memory that a flow may take beside the one that is drawn, its splines included, as a multiple of
 /// its lattice.
 const TIMES_ITS_LATTICE: u64 = 4;
+/// Memory that a mesh may take for light through its cells, as a multiple of its file: points,
+/// polynomials, and faces, in double precision.
+const TIMES_ITS_FILE: u64 = 20;
 
 /// The test sections of several images in turn: times of a series, or one flow in several scenes.
 ///
@@ -110,10 +114,11 @@ impl ReadAhead {
         {
             return;
         }
-        if !has_room_beside(section) {
+        let stamp = FileStamp::of(&next.flow.file);
+        if !has_room_beside(section, stamp) {
             return;
         }
-        let (scene, stamp) = (next.clone(), FileStamp::of(&next.flow.file));
+        let scene = next.clone();
         let thread = std::thread::spawn(move || {
             let section = TestSection::open(&scene, |_| ())?.with_caches();
             section.prepare(&scene);
@@ -128,23 +133,14 @@ impl ReadAhead {
     }
 }
 
-/// Whether the memory that is free will hold another section of this size, with its splines.
-pub(crate) fn has_room_beside(section: &TestSection) -> bool {
+/// Whether the memory that is free will hold another section of this size, with its splines, that
+/// is read from a file.
+pub(crate) fn has_room_beside(section: &TestSection, next: FileStamp) -> bool {
     let lattice = section.fields.iter().map(|f| f.memory_bytes() as u64).sum::<u64>();
-    available_bytes().is_none_or(|free| free >= TIMES_ITS_LATTICE * lattice)
-}
-
-/// Memory that programs can still take, where the system tells.
-fn available_bytes() -> Option<u64> {
-    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
-    available_in(&text)
-}
-
-/// The same from the text of `/proc/meminfo`.
-fn available_in(text: &str) -> Option<u64> {
-    let line = text.lines().find_map(|l| l.strip_prefix("MemAvailable:"))?;
-    let kib: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
-    kib.checked_mul(1024)
+    let file = next.0.map_or(0, |(_, length)| length);
+    let of_cells = if section.cells.is_empty() { 0 } else { TIMES_ITS_FILE.saturating_mul(file) };
+    let need = TIMES_ITS_LATTICE.saturating_mul(lattice).max(of_cells);
+    available_bytes().is_none_or(|free| free >= need)
 }
 
 #[cfg(test)]
@@ -168,14 +164,6 @@ mod tests {
         }
         std::fs::write(&path, text).unwrap();
         path
-    }
-
-    #[test]
-    fn memory_is_read_in_the_form_that_linux_writes() {
-        let text = "MemTotal:       24573284 kB\nMemAvailable:   22543420 kB\n";
-        assert_eq!(available_in(text), Some(22_543_420 * 1024));
-        assert_eq!(available_in("MemTotal: 1 kB\n"), None);
-        assert_eq!(available_in("MemAvailable: much kB\n"), None);
     }
 
     /// The images are those of sections that are read one by one, and a flow is read once.

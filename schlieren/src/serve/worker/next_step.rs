@@ -75,7 +75,7 @@ impl Worker {
         }
         let is_busy =
             self.next.as_ref().is_some_and(|n| n.is_of(&wanted) || !n.thread.is_finished());
-        if !is_busy && has_room_beside(&section.full) {
+        if !is_busy && has_room_beside(&section.full, FileStamp::of(&step.path)) {
             self.next = Some(NextStep::begin(self, wanted, number));
         }
     }
