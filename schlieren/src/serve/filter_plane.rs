@@ -139,7 +139,7 @@ pub(super) fn traced(
     f2_m: f64,
     at: [f64; 2],
 ) -> Option<(PlaneVector, PlaneVector)> {
-    let d = *traced.map.deflection_rad.get(traced.pixel_at(at)?)?;
+    let d = traced.light_at(at)?.mean_vector(&traced.map.deflection_rad)?;
     Some((d, d.map(|c| (f2_m * f64::from(c)) as f32)))
 }
 
@@ -256,14 +256,23 @@ mod tests {
         let of = |map: Map| DeflectionMap::new(map, FRAMING, false);
         let mut map = prism([1e-4, 0.0]);
         assert_eq!(traced(&of(map.clone()), 2.0, [0.5, 0.5]), Some(([1e-4, 0.0], [2e-4, 0.0])));
-        // All light lands a pixel to the right of where it starts, so light in column 2 starts in
-        // column 1.
+        // All light lands a pixel to the right of where it starts, so light in the middle of
+        // column 2 starts in that of column 1.
         map.displacement_m = vec![[1e-3, 0.0]; 16];
         map.deflection_rad[2 * 4 + 1] = [0.0, 3e-4];
-        assert_eq!(traced(&of(map.clone()), 2.0, [0.6, 0.6]).unwrap().1, [0.0, 6e-4]);
+        let close = |a: PlaneVector, b: PlaneVector| (0..2).all(|c| (a[c] - b[c]).abs() < 1e-9);
+        assert!(close(traced(&of(map.clone()), 2.0, [0.625, 0.625]).unwrap().1, [0.0, 6e-4]));
         // Rays from the film are known by where they end.
         let from_film = DeflectionMap::new(map.clone(), FRAMING, true);
-        assert_eq!(traced(&from_film, 2.0, [0.3, 0.6]).unwrap().1, [0.0, 6e-4]);
+        assert!(close(traced(&from_film, 2.0, [0.375, 0.625]).unwrap().1, [0.0, 6e-4]));
+        // Half-way to the next column, half of both.
+        let between = traced(&from_film, 2.0, [0.5, 0.625]).unwrap().0;
+        assert!(close(between, [0.5e-4, 1.5e-4]), "{between:?}");
+        // Beside a shadow, what the nearer side has.
+        map.transmission[2 * 4 + 2] = 0.0;
+        let shadow = DeflectionMap::new(map.clone(), FRAMING, true);
+        assert!(close(traced(&shadow, 2.0, [0.45, 0.625]).unwrap().0, [0.0, 3e-4]));
+        assert_eq!(traced(&shadow, 2.0, [0.55, 0.625]), None);
         map.transmission = vec![0.0; 16];
         assert_eq!(traced(&of(map), 2.0, [0.5, 0.5]), None);
     }

@@ -1,7 +1,7 @@
 //! What light does along a line on the image.
 
 use super::{RefusedChange, Session, refused};
-use crate::serve::filter_plane::traced;
+use crate::serve::deflection_map::Around;
 use serde::Serialize;
 
 /// Points of a profile.
@@ -39,7 +39,6 @@ impl Session {
         }
         let shared = self.lock();
         let view = shared.frame.as_ref().and_then(|f| f.traced.clone());
-        let f2_m = shared.scene.optics().schlieren_focal_length_m;
         drop(shared);
         let view = view.ok_or_else(|| refused("the image is not rendered yet"))?;
         let side = |c: usize, n: u32| (to[c] - from[c]) * f64::from(n) * view.framing.pixel_m;
@@ -48,24 +47,24 @@ impl Session {
             let t = i as f64 / (POINTS - 1) as f64;
             [0, 1].map(|c| (from[c] + t * (to[c] - from[c])).clamp(0.0, 1.0))
         };
-        let deflection = |i: usize| traced(&view, f2_m, point(i)).map(|found| found.0);
-        let pixels: Vec<_> = (0..POINTS).map(|i| view.pixel_at(point(i))).collect();
+        let places: Vec<_> = (0..POINTS).map(|i| view.light_at(point(i))).collect();
         let map = &view.map;
-        let waves = |k: &Option<usize>| k.and_then(|k| map.waves.get(k).copied());
-        let dots = |k: &Option<usize>| {
-            let moved = k.and_then(|k| map.apparent_m.get(k).copied());
+        let deflection = |p: &Option<Around>| p.and_then(|p| p.mean_vector(&map.deflection_rad));
+        let waves = |p: &Option<Around>| p.and_then(|p| p.mean(&map.waves));
+        let dots = |p: &Option<Around>| {
+            let moved = p.and_then(|p| p.mean_vector(&map.apparent_m));
             moved.filter(|m| m.iter().all(|c| c.is_finite()))
         };
         Ok(Profile {
             length_m,
-            deflection_rad: (0..POINTS).map(deflection).collect(),
+            deflection_rad: places.iter().map(deflection).collect(),
             waves: match map.waves.is_empty() {
                 true => Vec::new(),
-                false => pixels.iter().map(waves).collect(),
+                false => places.iter().map(waves).collect(),
             },
             dots_m: match map.apparent_m.is_empty() {
                 true => Vec::new(),
-                false => pixels.iter().map(dots).collect(),
+                false => places.iter().map(dots).collect(),
             },
         })
     }
