@@ -1,6 +1,7 @@
 //! The experiments, one file each, named after their table or figure.
 
 mod accuracy_build;
+mod accuracy_cells;
 mod accuracy_composite;
 mod accuracy_gpu;
 mod accuracy_paths;
@@ -321,6 +322,12 @@ pub const ALL: &[Experiment] = &[
         title: "Error of deflections against the size of the lattice to which a mesh is resampled, \
                 and its time",
         run: accuracy_resample::run,
+    },
+    Experiment {
+        id: "accuracy-cells",
+        chapter: 5,
+        title: "Light through the cells of a mesh or through a lattice: error, and time of a ray",
+        run: accuracy_cells::run,
     },
     Experiment {
         id: "shock-angles",
