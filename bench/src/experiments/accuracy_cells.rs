@@ -146,7 +146,9 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
             let mesh = MeshOfBlob::new(format!("{kind} {n}³"), grid)?;
             context.report_step(mesh.name.clone())?;
             let scenes = ways.iter().map(|w| w.scene()).collect::<anyhow::Result<Vec<_>>>()?;
-            let section = |scene: &Scene| TestSection::of_dataset(scene, &mesh.data, None);
+            let section = |scene: &Scene| -> anyhow::Result<TestSection> {
+                Ok(TestSection::of_dataset(scene, &mesh.data, None)?)
+            };
             let mut sections = vec![];
             for scene in &scenes {
                 check_cancelled(context)?;

@@ -147,6 +147,8 @@ impl Session {
             .env("HOME", dir)
             .env("XDG_STATE_HOME", dir)
             .env_remove("LD_LIBRARY_PATH")
+            // What programs print must come without it.
+            .env_remove("PYTHONUNBUFFERED")
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(errors);

@@ -269,8 +269,8 @@ const MOST_N_MINUS_1: f64 = 100.0;
 /// Reads a file as a field. For a time series this reads the first time; see [`series`] for the
 /// others.
 ///
-/// A large volume of one array (NRRD, MetaImage, raw: more than 2^27 nodes) of which fewer nodes are
-/// wanted is read plane by plane, as averages.
+/// A large volume of one array (NRRD, MetaImage, raw: more than 2^27 nodes) of which fewer nodes
+/// are wanted is read plane by plane, as averages.
 pub fn load(path: &Path, options: &Options) -> Result<LoadedField, InputError> {
     if let Some((data, warnings)) = planes::averaged(path, options)? {
         // Averages are the lattice that was wanted.

@@ -92,7 +92,7 @@ impl Window {
         let middle = coarse * block;
         let reach = (block / 2).min(middle).min(nodes - 1 - middle);
         // Near the faces, fewer whole nodes.
-        let halved = block % 2 == 0 && reach == block / 2;
+        let halved = block.is_multiple_of(2) && reach == block / 2;
         Window { first: middle - reach, last: middle + reach, halved }
     }
 
@@ -305,8 +305,8 @@ mod tests {
                 return Ok(());
             }
             let (image, values, warnings) = image(made.unwrap());
-            let [mx, my, _] = image.dims().map(|n| n as usize);
-            prop_assert!(image.dims().into_iter().max().unwrap() as usize <= wanted);
+            let [mx, my, _] = image.dims();
+            prop_assert!(image.dims().into_iter().max().unwrap() <= wanted);
             prop_assert_eq!(image.spacing, DVec3::new(0.5, 0.25, 1.0) * block as f64);
             for (n, found) in values.into_iter().enumerate() {
                 let at = [n % mx, n / mx % my, n / (mx * my)].map(|i| i * block);

@@ -13,10 +13,12 @@ camera = view.GetActiveCamera()
 camera.Azimuth(30)
 camera.Elevation(20)
 Render(view)
-print("ready", flush=True)
+# ParaView's own `print` goes through a buffer that `flush` does not empty, unless PYTHONUNBUFFERED
+# is set.
+os.write(1, b"ready\n")
 # ParaView's own `sys.stdin` strips line ends, so an empty line looks like the end of the input.
 commands = os.fdopen(os.dup(0))
 while commands.readline():
     camera.Azimuth(5)
     Render(view)
-    print("frame", flush=True)
+    os.write(1, b"frame\n")
