@@ -140,15 +140,14 @@ impl Kernel {
         let mut text = format!("const OPD = {};\nconst OBLIQUE = {oblique};\n", self.opd);
         text += include_str!("march.wgsl");
         text += &include_str!("line_of_sight.wgsl")
-            .replace("PROJECTION_BINDING", &PROJECTION.to_string())
-            .replace("BINDING", &FIRST_SLAB.to_string());
-        for (side, binding) in ["right", "up"].iter().zip(FIRST_SLAB + 1..) {
-            text += &if oblique {
-                include_str!("line_of_sight_slopes.wgsl")
-                    .replace("SIDE", side)
+            .replace("PROJECTION_BINDING", &PROJECTION.to_string());
+        for (map, binding) in ["path", "right", "up"].iter().zip(FIRST_SLAB..) {
+            text += &if oblique || binding == FIRST_SLAB {
+                include_str!("map.wgsl")
+                    .replace("MAP", map)
                     .replace("BINDING", &binding.to_string())
             } else {
-                format!("fn {side}_slope(c: MapCell) -> f32 {{\n    return 0.0;\n}}\n")
+                format!("fn sample_{map}(c: MapCell) -> vec3f {{\n    return vec3f(0.0);\n}}\n")
             };
         }
         text + if self.nodes {

@@ -1,8 +1,8 @@
 // Straight rays: march/line_of_sight.rs in WGSL. The field is projected along the light, and a ray
 // samples its path and deflection from splines over the plane across it.
 //
-// The host adds `const OPD` and `const OBLIQUE`, and `right_slopes` and `up_slopes`, or functions
-// of these names without effect.
+// The host adds `const OPD` and `const OBLIQUE`, and of map.wgsl `sample_path`, and for oblique
+// views `sample_right` and `sample_up`, which are without effect along an axis.
 
 struct Projection {
     // Map coordinate of the view's centre, and map steps per metre, as high and low parts.
@@ -18,7 +18,6 @@ struct Projection {
 }
 
 @group(0) @binding(PROJECTION_BINDING) var<uniform> projection: Projection;
-@group(0) @binding(BINDING) var<storage, read> path_coefficients: array<f32>;
 
 // A cell of the map, as the first of its 4 x 4 coefficients, and the weights of these.
 struct MapCell {
@@ -67,26 +66,6 @@ fn spline_of_rows(c: MapCell, a: vec4f, b: vec4f, d: vec4f, e: vec4f) -> vec3f {
         fma(w.w, value.w, fma(w.z, value.z, fma(w.y, value.y, w.x * value.x))),
         fma(g.z, dx.z, fma(g.y, dx.y, g.x * dx.x)),
         fma(w.w, along_up.w, fma(w.z, along_up.z, fma(w.y, along_up.y, w.x * along_up.x))),
-    );
-}
-
-fn path_row(first: u32) -> vec4f {
-    return vec4f(
-        path_coefficients[first],
-        path_coefficients[first + 1u],
-        path_coefficients[first + 2u],
-        path_coefficients[first + 3u],
-    );
-}
-
-fn sample_path(c: MapCell) -> vec3f {
-    let row = projection.row;
-    return spline_of_rows(
-        c,
-        path_row(c.first),
-        path_row(c.first + row),
-        path_row(c.first + 2u * row),
-        path_row(c.first + 3u * row),
     );
 }
 

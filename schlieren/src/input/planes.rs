@@ -38,13 +38,16 @@ fn averaged_above(
     options: &Options,
     most_nodes: u64,
 ) -> Result<Option<(Dataset, Vec<String>)>, InputError> {
-    let is_plain = options.bounds.is_none() && options.depth.is_none();
+    // What the reader refuses, it refuses by name.
+    let is_asked_of_reader = options.file.time.is_some() || options.file.gap.is_some();
+    let is_plain = options.bounds.is_none() && options.depth.is_none() && !is_asked_of_reader;
     let (true, Some(planes)) = (is_plain, VolumePlanes::open(path)?) else { return Ok(None) };
     let dims = planes.layout().dims.to_array().map(|n| n as usize);
     let nodes = dims.iter().map(|n| *n as u64).product::<u64>();
     if nodes <= most_nodes {
         return Ok(None);
     }
+    check_lattice(options)?;
     let longest = dims.into_iter().max().unwrap_or(1);
     match options.resolution {
         Resolution::Longest(wanted) if wanted >= 2 && wanted < longest => {
@@ -65,6 +68,25 @@ fn averaged_above(
             }
         }
     }
+}
+
+/// What the reader of a whole file checks, too.
+fn check_lattice(options: &Options) -> Result<(), InputError> {
+    let is_finite = |v: Option<[f64; 3]>| v.is_none_or(|v| v.iter().all(|x| x.is_finite()));
+    let (spacing, origin) = (options.file.spacing, options.file.origin);
+    if !is_finite(spacing) || !spacing.is_none_or(|v| v.iter().all(|x| *x > 0.0)) {
+        return Err(InputError::Option {
+            what: format!("the spacing is {:?}", spacing.unwrap_or_default()),
+            cure: "give finite numbers above 0",
+        });
+    }
+    if !is_finite(origin) {
+        return Err(InputError::Option {
+            what: format!("the origin is {:?}", origin.unwrap_or_default()),
+            cure: "give finite numbers",
+        });
+    }
+    Ok(())
 }
 
 fn too_large(nodes: u64, need: u64, free: u64) -> InputError {
@@ -243,6 +265,7 @@ fn said(fine: [usize; 3], coarse: [usize; 3], block: usize) -> String {
 mod tests {
     use super::*;
     use crate::input::Medium;
+    use datasets::read::OpenOptions;
     use proptest::prelude::*;
     use std::path::PathBuf;
 
@@ -339,6 +362,23 @@ mod tests {
         assert!(averaged_above(&path, &all, 1).unwrap().is_none(), "it fits");
         let error = too_large(1 << 33, 20 << 33, 8 << 30).to_string();
         assert!(error.contains("160.0 GiB") && error.contains("--resample NODES"), "{error}");
+    }
+
+    #[test]
+    fn options_of_the_reader_are_kept_or_refused_as_it_does() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = write_nrrd(folder.path(), [9; 3], |_| 1.2);
+        let with = |file| averaged_above(&path, &Options { file, ..options(5) }, 1);
+        let spacing = Some([2.0; 3]);
+        let (image, ..) = image(with(OpenOptions { spacing, ..Default::default() }).unwrap());
+        assert_eq!(image.spacing, DVec3::splat(4.0));
+        for wrong in [[0.0, 1.0, 1.0], [1.0, f64::NAN, 1.0]] {
+            let file = OpenOptions { spacing: Some(wrong), ..Default::default() };
+            assert!(with(file).unwrap_err().to_string().contains("above 0"));
+        }
+        // A time is left to the reader, which refuses it.
+        let time = Some(1.0);
+        assert!(with(OpenOptions { time, ..Default::default() }).unwrap().is_none());
     }
 
     #[test]

@@ -28,7 +28,7 @@ fn cross_flow(position_m: vec2f, tilt: vec2f) -> Crossing {
     let path = sample_path(cell);
     var slope = path.yz * projection.per_m;
     if OBLIQUE {
-        slope = vec2f(right_slope(cell), up_slope(cell));
+        slope = vec2f(sample_right(cell).x, sample_up(cell).x);
     }
     crossing.deflection_rad = vec2f(frame.mirror * slope.x, slope.y);
     crossing.displacement_m = crossing.deflection_rad * crossing.exit_depth_m;
