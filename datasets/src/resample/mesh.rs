@@ -16,6 +16,7 @@ use glam::{DMat3, DVec3};
 use layers::{flat_source, hidden_cells_of_lattice, plane_normal};
 use rayon::prelude::*;
 use rt_core::math::median_high;
+use smallvec::{SmallVec, smallvec};
 use std::ops::Range;
 use topology::Computed;
 pub(super) use topology::Topology;
@@ -87,7 +88,7 @@ struct Explicit {
 
 /// A cell: its corners in VTK's order and its shape.
 pub(super) struct Corners {
-    pub(super) ids: Vec<u32>,
+    pub(super) ids: SmallVec<[u32; 8]>,
     pub(super) shape: Shape,
 }
 
@@ -473,7 +474,7 @@ impl Mesh {
                 let at = |di: usize, dj: usize, dk: usize| {
                     (first + i + di + nx * (j + dj + ny * (k + dk))) as u32
                 };
-                let ids = vec![
+                let ids = smallvec![
                     at(0, 0, 0),
                     at(1, 0, 0),
                     at(1, 1, 0),

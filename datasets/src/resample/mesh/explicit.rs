@@ -2,13 +2,15 @@
 
 use super::{Corners, Explicit, Shape};
 use crate::model::CellType;
+use smallvec::SmallVec;
 
 impl Explicit {
     /// The corners of a cell, whose points count from `first` on.
     pub(super) fn corners(&self, local: usize, first: u32) -> Corners {
         let c = self.cell[local] as usize;
         let ids = self.grid.cells.get(c);
-        let pick = |order: &[usize]| order.iter().map(|&i| ids[i] + first).collect::<Vec<u32>>();
+        let pick =
+            |order: &[usize]| order.iter().map(|&i| ids[i] + first).collect::<SmallVec<[u32; 8]>>();
         // Higher-order cells store their corners first.
         match (self.grid.types[c], CellType::of(self.grid.types[c])) {
             (11, _) => Corners { ids: pick(&[0, 1, 3, 2, 4, 5, 7, 6]), shape: Shape::Hexa },

@@ -4,8 +4,10 @@
 //! Coefficients are f32 in memory already. Values are taken relative to the first corner's, and
 //! places to its place, so that f32 keeps the digits of differences.
 
-use crate::resample::reconstruct::{CAUTION, Expansion, FACTOR_FALL, TERMS, UNRESOLVED, factors};
-use glam::DVec3;
+use crate::resample::reconstruct::{
+    CAUTION, Expansion, FACTOR_FALL, Parts, TERMS, UNRESOLVED, factors,
+};
+use glam::{DMat3, DVec3};
 
 /// Corners that are evaluated at once.
 pub(super) const LANES: usize = 4;
@@ -13,23 +15,49 @@ pub(super) const LANES: usize = 4;
 type Lane = [f32; LANES];
 const ZERO: Lane = [0.0; LANES];
 
-/// Shares of four corners and their gradients.
+/// Shares of four corners, and their slopes along the parameters of the cell.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Share {
     n: Lane,
-    gradient: [Lane; 3],
+    slope: [Lane; 3],
 }
 
 impl Share {
-    pub(super) const NONE: Share = Share { n: ZERO, gradient: [ZERO; 3] };
+    pub(super) const NONE: Share = Share { n: ZERO, slope: [ZERO; 3] };
+
+    /// Those of a tetrahedron at its parameters.
+    pub(super) fn of_tetrahedron(q: DVec3) -> Share {
+        let first = 1.0 - q.x - q.y - q.z;
+        let slope = [[-1.0, 1.0, 0.0, 0.0], [-1.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 1.0]];
+        Share { n: [first, q.x, q.y, q.z].map(|n| n as f32), slope }
+    }
+
+    /// Those of the lower and the upper corners of a hexahedron at its parameters.
+    pub(super) fn of_hexahedron(q: DVec3) -> [Share; 2] {
+        let [r, s, t] = q.to_array().map(|x| x as f32);
+        let [r1, s1, t1] = (1.0 - q).to_array().map(|x| x as f32);
+        let (along_r, along_s) = ([r1, r, r, r1], [s1, s1, s, s]);
+        let (up_r, up_s) = ([-1.0, 1.0, 1.0, -1.0], [-1.0, -1.0, 1.0, 1.0]);
+        let mut shares = [Share::NONE; 2];
+        for (share, (height, up)) in shares.iter_mut().zip([(t1, -1.0), (t, 1.0)]) {
+            for l in 0..LANES {
+                let across = along_r[l] * along_s[l];
+                share.n[l] = across * height;
+                share.slope[0][l] = up_r[l] * along_s[l] * height;
+                share.slope[1][l] = along_r[l] * up_s[l] * height;
+                share.slope[2][l] = up * across;
+            }
+        }
+        shares
+    }
 }
 
-/// Sets the share of corner `i` and its gradient.
-pub(super) fn set(shares: &mut [Share], i: usize, n: f64, gradient: DVec3) {
+/// Sets the share of corner `i` and its slopes.
+pub(super) fn set(shares: &mut [Share], i: usize, n: f64, slope: DVec3) {
     let (share, lane) = (&mut shares[i / LANES], i % LANES);
     share.n[lane] = n as f32;
     for a in 0..3 {
-        share.gradient[a][lane] = gradient[a] as f32;
+        share.slope[a][lane] = slope[a] as f32;
     }
 }
 
@@ -128,75 +156,60 @@ impl Polynomials {
             group.whole[l] = f32::from(u8::from(is_whole(&corner)));
             let Some(expansion) = corner.expansion else { continue };
             self.linear = false;
-            let mut parts = expansion.parts();
             if mean == Mean::Doubted && !expansion.is_whole() {
-                parts = parts.times((1.0 - UNRESOLVED) as f32);
+                group.set(l, &expansion.parts().times((1.0 - UNRESOLVED) as f32), factors);
+            } else {
+                group.set(l, expansion.parts(), factors);
             }
-            for (lane, f) in group.frame.iter_mut().zip(parts.frame) {
-                lane[l] = f;
-            }
-            for (n, (lane, c)) in group.terms.iter_mut().zip(parts.terms).enumerate() {
-                lane[l] = factors[degree_of(n) - 1] * c;
-            }
-            group.constant[l] = parts.constant;
-            let bounds = parts.bounds;
-            (group.low[l], group.high[l]) = (bounds.low, bounds.high);
-            group.reach[l] = 2.0 * bounds.slack;
-            group.fall[l] = if bounds.slack > 0.0 { 0.25 / bounds.slack } else { 0.0 };
         }
     }
 
-    /// The value and its gradient at `at`, relative to the cell's origin.
-    pub(super) fn blend(&self, at: DVec3, shares: &[Share]) -> (f64, DVec3) {
+    /// The value and its gradient at `at`, relative to the cell's origin. `to_space` has the
+    /// gradients of the parameters as its columns.
+    pub(super) fn blend(&self, at: DVec3, shares: &[Share], to_space: &DMat3) -> (f64, DVec3) {
         let at = at.to_array().map(|x| x as f32);
+        let (mut lanes, mut by_factors) = (Lanes::NONE, DVec3::ZERO);
         if self.mixed {
-            return self.blend_mixed(at, shares);
-        }
-        let mut sum = [0.0f64; 4];
-        for (group, share) in self.groups.iter().zip(shares) {
-            let lanes = match self.linear {
-                true => group.linear(share),
-                false => group.cubic(at, share, [1.0; 3]).0,
-            };
-            for (s, lane) in sum.iter_mut().zip(lanes) {
-                *s += f64::from(total(lane));
+            // Where factors change, the gradient also has a part along theirs.
+            let (mut whole, mut slope) = (0.0f64, DVec3::ZERO);
+            for (group, share) in self.groups.iter().zip(shares) {
+                let of = |n: &Lane| {
+                    let lanes = [0, 1, 2, 3].map(|l| n[l] * group.whole[l]);
+                    f64::from(total(lanes))
+                };
+                whole += of(&share.n);
+                slope += DVec3::from([0, 1, 2].map(|a| of(&share.slope[a])));
+            }
+            let factors = factors(self.factors_of_share * whole).map(|f| f as f32);
+            let mut by_whole = 0.0;
+            for (group, share) in self.groups.iter().zip(shares) {
+                by_whole += f64::from(total(group.cubic(at, share, factors, &mut lanes)));
+            }
+            by_factors = by_whole * self.factors_of_share * slope;
+        } else {
+            for (group, share) in self.groups.iter().zip(shares) {
+                match self.linear {
+                    true => group.linear(share, &mut lanes),
+                    false => _ = group.cubic(at, share, [1.0; 3], &mut lanes),
+                }
             }
         }
-        (self.value + sum[0], DVec3::new(sum[1], sum[2], sum[3]))
-    }
-
-    /// As [`Polynomials::blend`] where factors change: ∇f also has a part along their gradient.
-    fn blend_mixed(&self, at: [f32; 3], shares: &[Share]) -> (f64, DVec3) {
-        let (mut whole, mut slope) = (0.0f64, DVec3::ZERO);
-        for (group, share) in self.groups.iter().zip(shares) {
-            let of = |n: &Lane| {
-                let lanes = [0, 1, 2, 3].map(|l| n[l] * group.whole[l]);
-                f64::from(total(lanes))
-            };
-            whole += of(&share.n);
-            slope += DVec3::from([0, 1, 2].map(|a| of(&share.gradient[a])));
-        }
-        let factors = factors(self.factors_of_share * whole).map(|f| f as f32);
-        let slope = self.factors_of_share * slope;
-        let (mut sum, mut by_whole) = ([0.0f64; 4], 0.0);
-        for (group, share) in self.groups.iter().zip(shares) {
-            let (lanes, more) = group.cubic(at, share, factors);
-            for (s, lane) in sum.iter_mut().zip(lanes) {
-                *s += f64::from(total(lane));
-            }
-            by_whole += f64::from(total(more));
-        }
-        (self.value + sum[0], DVec3::new(sum[1], sum[2], sum[3]) + by_whole * slope)
+        let sum = |of: [Lane; 3]| DVec3::from(of.map(|lane| f64::from(total(lane))));
+        let gradient = sum(lanes.gradient) + *to_space * (sum(lanes.slope) + by_factors);
+        (self.value + f64::from(total(lanes.value)), gradient)
     }
 }
 
-/// The degree of a monomial in the order of `polynomial::monomials`.
-fn degree_of(term: usize) -> usize {
-    match term {
-        0..3 => 1,
-        3..9 => 2,
-        _ => 3,
-    }
+/// What corners contribute, a lane for each in turn: to the value, to its gradient by those of the
+/// polynomials, and to its slopes along parameters by those of the shares.
+struct Lanes {
+    value: Lane,
+    gradient: [Lane; 3],
+    slope: [Lane; 3],
+}
+
+impl Lanes {
+    const NONE: Lanes = Lanes { value: ZERO, gradient: [ZERO; 3], slope: [ZERO; 3] };
 }
 
 fn total(l: Lane) -> f32 {
@@ -204,24 +217,39 @@ fn total(l: Lane) -> f32 {
 }
 
 impl Group {
-    fn linear(&self, share: &Share) -> [Lane; 4] {
-        let mut out = [ZERO; 4];
-        for l in 0..LANES {
-            out[0][l] = share.n[l] * self.value[l];
-            for a in 0..3 {
-                out[a + 1][l] = share.gradient[a][l] * self.value[l];
+    /// Sets the polynomial of a corner, with factors for the terms of each degree. Terms are in the
+    /// order of `polynomial::monomials`.
+    fn set(&mut self, l: usize, parts: &Parts, factors: [f32; 3]) {
+        for (lane, f) in self.frame.iter_mut().zip(parts.frame) {
+            lane[l] = f;
+        }
+        for (degree, factor) in [0..3, 3..9, 9..TERMS].into_iter().zip(factors) {
+            for n in degree {
+                self.terms[n][l] = factor * parts.terms[n];
             }
         }
-        out
+        self.constant[l] = parts.constant;
+        let bounds = parts.bounds;
+        (self.low[l], self.high[l]) = (bounds.low, bounds.high);
+        self.reach[l] = 2.0 * bounds.slack;
+        self.fall[l] = if bounds.slack > 0.0 { 0.25 / bounds.slack } else { 0.0 };
     }
 
-    /// Value and gradient with factors for the terms of each degree, and the derivative of the
-    /// value by the share of whole corners, which makes the factors. Terms are in the order of
-    /// `polynomial::monomials`.
+    fn linear(&self, share: &Share, out: &mut Lanes) {
+        for l in 0..LANES {
+            out.value[l] += share.n[l] * self.value[l];
+            for a in 0..3 {
+                out.slope[a][l] += share.slope[a][l] * self.value[l];
+            }
+        }
+    }
+
+    /// Adds value and gradient with factors for the terms of each degree. Returns the derivative of
+    /// the value by the share of whole corners, which makes the factors.
     #[inline(always)]
-    fn cubic(&self, at: [f32; 3], share: &Share, [f1, f2, f3]: [f32; 3]) -> ([Lane; 4], Lane) {
+    fn cubic(&self, at: [f32; 3], share: &Share, [f1, f2, f3]: [f32; 3], out: &mut Lanes) -> Lane {
         let (f, c) = (&self.frame, &self.terms);
-        let (mut out, mut by_whole) = ([ZERO; 4], ZERO);
+        let mut by_whole = ZERO;
         for l in 0..LANES {
             let d = [0, 1, 2].map(|a| at[a] - self.place[a][l]);
             let x = f[0][l] * d[0];
@@ -257,14 +285,16 @@ impl Group {
             let gy = f1 * c[1][l] + f2 * hy + f3 * ky;
             let gz = f1 * c[2][l] + f2 * hz + f3 * kz;
             let value = self.value[l] + change;
-            out[0][l] = share.n[l] * value;
-            out[1][l] =
-                share.gradient[0][l] * value + free * (f[0][l] * gx + f[1][l] * gy + f[3][l] * gz);
-            out[2][l] = share.gradient[1][l] * value + free * (f[2][l] * gy + f[4][l] * gz);
-            out[3][l] = share.gradient[2][l] * value + free * (f[5][l] * gz);
+            out.value[l] += share.n[l] * value;
+            out.slope[0][l] += share.slope[0][l] * value;
+            out.slope[1][l] += share.slope[1][l] * value;
+            out.slope[2][l] += share.slope[2][l] * value;
+            out.gradient[0][l] += free * (f[0][l] * gx + f[1][l] * gy + f[3][l] * gz);
+            out.gradient[1][l] += free * (f[2][l] * gy + f[4][l] * gz);
+            out.gradient[2][l] += free * (f[5][l] * gz);
             // A term of degree k falls by k times this.
             by_whole[l] = -(FACTOR_FALL as f32) * free * (first + second + third);
         }
-        (out, by_whole)
+        by_whole
     }
 }

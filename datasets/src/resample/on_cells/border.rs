@@ -162,11 +162,19 @@ impl Border {
     }
 }
 
-/// The sum of the normals of a ring's triangles (Newell), and its middle.
+/// The sum of the normals of a ring's triangles, each as long as twice the area (Newell), and its
+/// middle.
 pub(super) fn normal_and_middle(ring: &[DVec3]) -> (DVec3, DVec3) {
     let middle = ring.iter().sum::<DVec3>() / ring.len() as f64;
-    let count = ring.len();
-    let normal = (0..count).map(|i| (ring[i] - middle).cross(ring[(i + 1) % count] - middle)).sum();
+    let normal = match *ring {
+        [a, b, c] => (b - a).cross(c - a),
+        // The sum is the product of the diagonals.
+        [a, b, c, d] => (c - a).cross(d - b),
+        _ => {
+            let next = ring.iter().cycle().skip(1);
+            ring.iter().zip(next).map(|(a, b)| (a - middle).cross(b - middle)).sum()
+        }
+    };
     (normal, middle)
 }
 
@@ -191,7 +199,7 @@ pub(super) fn each_triangle(
 ///
 /// Signed volumes with the edges, as with Plücker coordinates: two triangles with a common edge
 /// compute the same number for it with opposite signs, so that no line passes between them.
-pub(super) fn line_through([a, b, c]: [DVec3; 3], direction: DVec3) -> Option<(f64, bool)> {
+fn line_through([a, b, c]: [DVec3; 3], direction: DVec3) -> Option<(f64, bool)> {
     let edges = [b.cross(c), c.cross(a), a.cross(b)].map(|n| n.dot(direction));
     let [x, y, z] = edges;
     let inside = x >= 0.0 && y >= 0.0 && z >= 0.0 || x <= 0.0 && y <= 0.0 && z <= 0.0;

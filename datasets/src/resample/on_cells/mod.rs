@@ -27,18 +27,20 @@ mod cell;
 mod shares;
 #[cfg(test)]
 mod tests;
+mod trilinear;
 mod walker;
 
 pub use walker::{Beyond, CellWalker, Entry};
 
-use super::mesh::{Corners, Mesh, Neighbours, Topology};
+use super::mesh::{Mesh, Neighbours, Topology};
 use super::reconstruct::{Expansion, FitQuality, PointField, Reconstruction, Symmetry};
-use super::shape::{self, Shares};
+use super::shape::Shares;
 use super::walls::Walls;
 use super::{ResampleError, Samples};
 use blend::Mean;
 use bodies::Bodies;
 use border::Border;
+use cell::Form;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -93,6 +95,7 @@ pub struct CellField {
     /// Those of cells with limited points.
     shares: Shares,
     kinds: Vec<Kind>,
+    forms: Vec<Form>,
     neighbours: Neighbours,
     border: Border,
     /// The faces of hidden cells at the border of the mesh.
@@ -195,7 +198,7 @@ impl CellField {
                 && ids.iter().all(|&id| values[id as usize].is_finite())
         };
         let Topology { volumes, mut neighbours } = mesh.take_topology();
-        let kind_and_fold = |cell: usize| {
+        let kind_and_form = |cell: usize| {
             let corners = mesh.corners(cell);
             let kind = match volumes[cell] {
                 0.0 => Kind::LeftOut,
@@ -203,10 +206,17 @@ impl CellField {
                 _ if has_value(cell, &corners.ids) => Kind::Gas,
                 _ => Kind::NoValue,
             };
-            (kind, kind == Kind::Gas && is_folded(&mesh, &corners))
+            let beyond = neighbours.of_cell(cell);
+            let form = if kind == Kind::LeftOut {
+                Form::default()
+            } else {
+                Form::of(&mesh, &corners, beyond)
+            };
+            (kind, form)
         };
-        let (kinds, folded): (Vec<Kind>, Vec<bool>) =
-            (0..mesh.num_cells()).into_par_iter().map(kind_and_fold).unzip();
+        let (kinds, forms): (Vec<Kind>, Vec<Form>) =
+            (0..mesh.num_cells()).into_par_iter().map(kind_and_form).unzip();
+        let folded = kinds.iter().zip(&forms).filter(|(k, f)| **k == Kind::Gas && f.folded).count();
         let of = |kind: Kind| kinds.iter().filter(|k| **k == kind).count();
         let cells = of(Kind::Gas);
         if cells == 0 {
@@ -230,7 +240,7 @@ impl CellField {
             without_value: of(Kind::NoValue),
             hidden: of(Kind::Hidden),
             left_out: mesh.left_out() + of(Kind::LeftOut),
-            folded: folded.iter().filter(|f| **f).count(),
+            folded,
             straightened: mesh.higher_order(),
             crowded_faces: neighbours.crowded(),
             border_faces: border.len(),
@@ -244,6 +254,7 @@ impl CellField {
             expansions,
             shares,
             kinds,
+            forms,
             neighbours,
             border,
             hidden,
@@ -350,10 +361,4 @@ fn weighted_median(mut pairs: Vec<(f64, f64)>) -> Option<f64> {
         below >= half
     });
     middle.or(pairs.last()).map(|p| p.0)
-}
-
-/// Whether the map of a cell folds.
-fn is_folded(mesh: &Mesh, corners: &Corners) -> bool {
-    let points: Vec<DVec3> = corners.ids.iter().map(|&i| mesh.point(i as usize)).collect();
-    shape::Cell::new(&points, &corners.shape).is_folded()
 }

@@ -6,13 +6,14 @@
 //! their gradients.
 
 use super::blend::{LANES, Share, set};
+use super::trilinear::Trilinear;
 use crate::resample::mesh::Shape;
-use crate::resample::shape::{Cell, Shares, basis};
+use crate::resample::shape::Shares;
 use glam::{DMat3, DVec3};
 
 /// Newton has converged when the step, in units of the cell, is this small: the next one would be
-/// of the order of its square.
-const CONVERGED: f64 = 1e-7;
+/// of the order of its square, and the Jacobian before this step is as good as one in f32.
+const CONVERGED: f64 = 1e-6;
 /// Steps, at most. The first guess is that of the linear map at the middle.
 const MAX_STEPS: usize = 16;
 /// A cell whose corners are this near those of a parallelepiped, as a part of its size, has a
@@ -25,6 +26,7 @@ pub(super) struct Map {
     kind: MapKind,
     shape: Option<Shape>,
     shares: Shares,
+    place: Trilinear,
     /// Place and inverse Jacobian at the parameters `middle`.
     middle: DVec3,
     at_middle: DVec3,
@@ -41,8 +43,16 @@ enum MapKind {
 }
 
 impl Map {
-    pub(super) fn prepare(&mut self, corners: &[DVec3], shape: &Shape, size: f64, shares: Shares) {
-        self.kind = MapKind::Newton;
+    /// The map of a cell of this size, which is folded or not.
+    pub(super) fn prepare(
+        &mut self,
+        corners: &[DVec3],
+        shape: Shape,
+        size: f64,
+        is_folded: bool,
+        shares: Shares,
+    ) {
+        self.kind = MapKind::Fan;
         self.shares = shares;
         self.middle = match shape {
             Shape::Tetra => DVec3::splat(0.25),
@@ -50,104 +60,75 @@ impl Map {
             Shape::Pyramid => DVec3::new(0.5, 0.5, 0.2),
             _ => DVec3::splat(0.5),
         };
-        let folded = matches!(shape, Shape::Faces(_)) || Cell::new(corners, shape).is_folded();
-        if folded {
-            (self.kind, self.shape) = (MapKind::Fan, Some(shape.clone()));
-            return;
+        if let Some(place) = Trilinear::new(corners, &shape).filter(|_| !is_folded) {
+            let (at, jacobian) = place.at(self.middle);
+            let inverse = jacobian.inverse();
+            if inverse.is_finite() {
+                let linear = place.is_linear(AFFINE * size);
+                self.kind = if linear { MapKind::Affine } else { MapKind::Newton };
+                (self.place, self.at_middle, self.inverse) = (place, at, inverse);
+            }
         }
-        let (at, jacobian) = place_and_jacobian(corners, shape, self.middle);
-        let edges = match shape {
-            Shape::Hexa => [corners[1], corners[3], corners[4]],
-            Shape::Wedge => [corners[1], corners[2], corners[3]],
-            _ => [corners[1], corners[2], corners[3.min(corners.len() - 1)]],
-        };
-        let off = |i: usize, p: DVec3| (corners[i] - p).length() <= AFFINE * size;
-        let [a, b, c] = edges;
-        let affine = match shape {
-            Shape::Tetra => true,
-            Shape::Hexa => off(2, a + b) && off(5, a + c) && off(6, a + b + c) && off(7, b + c),
-            Shape::Wedge => off(4, a + c) && off(5, b + c),
-            _ => false,
-        };
-        let inverse = jacobian.inverse();
-        if !inverse.is_finite() {
-            (self.kind, self.shape) = (MapKind::Fan, Some(shape.clone()));
-            return;
-        }
-        if affine {
-            self.kind = MapKind::Affine;
-        }
-        (self.at_middle, self.inverse) = (at, inverse);
-        self.shape = Some(shape.clone());
+        self.shape = Some(shape);
     }
-}
 
-/// Place relative to the first corner, and Jacobian.
-fn place_and_jacobian(corners: &[DVec3], shape: &Shape, q: DVec3) -> (DVec3, DMat3) {
-    if *shape == Shape::Tetra {
-        let edges = DMat3::from_cols(corners[1], corners[2], corners[3]);
-        return (edges * q, edges);
-    }
-    let (n, d) = basis(shape, q);
-    let (mut x, mut j) = (DVec3::ZERO, DMat3::ZERO);
-    for (i, &p) in corners.iter().enumerate() {
-        x += n[i] * p;
-        j.x_axis += d[i].x * p;
-        j.y_axis += d[i].y * p;
-        j.z_axis += d[i].z * p;
-    }
-    (x, j)
-}
-
-/// The shares of the corners at `at`; both are relative to the cell's origin. False when there are
-/// none: all its tetrahedra are flat.
-pub(super) fn shares(corners: &[DVec3], map: &Map, at: DVec3, out: &mut Vec<Share>) -> bool {
-    let groups = corners.len().div_ceil(LANES);
-    out.clear();
-    out.resize(groups, Share::NONE);
-    let Some(shape) = &map.shape else { return false };
-    if map.kind == MapKind::Fan {
-        return by_tetrahedra(corners, shape, at, out);
-    }
-    let mut q = map.middle + map.inverse * (at - map.at_middle);
-    let mut inverse = map.inverse;
-    if map.kind == MapKind::Newton {
+    /// The parameters of a place, and the inverse of the Jacobian there. `None` when Newton's
+    /// method fails, and for cells without a map.
+    fn parameters(&self, at: DVec3) -> Option<(DVec3, DMat3)> {
+        let q = self.middle + self.inverse * (at - self.at_middle);
+        match self.kind {
+            MapKind::Affine => return Some((q, self.inverse)),
+            MapKind::Fan => return None,
+            MapKind::Newton => {}
+        }
         let within = |q: DVec3| q.clamp(DVec3::splat(-0.5), DVec3::splat(1.5));
-        q = within(q);
-        let mut converged = false;
+        let mut q = within(q);
         for _ in 0..MAX_STEPS {
-            let (x, jacobian) = place_and_jacobian(corners, shape, q);
-            inverse = jacobian.inverse();
+            let (x, jacobian) = self.place.at(q);
+            let inverse = jacobian.inverse();
             let next = within(q + inverse * (at - x));
             let moved = (next - q).abs().max_element();
             q = next;
             // NaN has not converged either.
             if moved <= CONVERGED {
-                converged = true;
-                break;
+                return Some((q, inverse));
             }
             if !moved.is_finite() {
                 break;
             }
         }
-        if !converged {
-            return by_tetrahedra(corners, shape, at, out);
+        None
+    }
+}
+
+/// The shares of the corners at `at`, and their slopes along parameters, whose gradients in space
+/// are the columns of the result. Places are relative to the cell's origin. `None` when there are
+/// no shares: all tetrahedra of the cell are flat.
+pub(super) fn shares(
+    corners: &[DVec3],
+    map: &Map,
+    at: DVec3,
+    out: &mut Vec<Share>,
+) -> Option<DMat3> {
+    let shape = map.shape.as_ref()?;
+    out.clear();
+    out.resize(corners.len().div_ceil(LANES), Share::NONE);
+    let Some((q, inverse)) = map.parameters(at) else {
+        return by_tetrahedra(corners, shape, at, out).then_some(DMat3::IDENTITY);
+    };
+    match (shape, map.shares, &mut out[..]) {
+        (Shape::Tetra, _, [share]) => *share = Share::of_tetrahedron(q),
+        (Shape::Hexa, Shares::OfElement, [lower, upper]) => {
+            [*lower, *upper] = Share::of_hexahedron(q);
+        }
+        _ => {
+            let (n, d) = map.shares.at(shape, q);
+            for i in 0..corners.len() {
+                set(out, i, n[i], d[i]);
+            }
         }
     }
-    let to_space = inverse.transpose();
-    if *shape == Shape::Tetra {
-        let first = 1.0 - q.x - q.y - q.z;
-        set(out, 0, first, to_space * DVec3::NEG_ONE);
-        for (i, axis) in DVec3::AXES.into_iter().enumerate() {
-            set(out, i + 1, q[i], to_space * axis);
-        }
-        return true;
-    }
-    let (n, d) = map.shares.at(shape, q);
-    for i in 0..corners.len() {
-        set(out, i, n[i], to_space * d[i]);
-    }
-    true
+    Some(inverse.transpose())
 }
 
 /// The shares in that tetrahedron, between the cell's middle, a face's middle and an edge, which

@@ -3,7 +3,6 @@
 use super::CellField;
 use super::blend::{Mean, Share};
 use super::cell::PreparedCell;
-use super::shares::shares;
 use crate::resample::mesh::{HIDDEN, OUTSIDE, WALL};
 use glam::DVec3;
 
@@ -200,12 +199,7 @@ impl<'a> CellWalker<'a> {
         let slot = self.slot(cell);
         let CellWalker { kept, shares: of_corners, .. } = self;
         let Some(kept) = &kept[slot] else { unreachable!("the slot was filled") };
-        let prepared = &kept.1;
-        let at = at - prepared.origin;
-        if !prepared.has_values || !shares(&prepared.corners, &prepared.map, at, of_corners) {
-            return (f64::NAN, DVec3::NAN);
-        }
-        prepared.polynomials.blend(at, of_corners)
+        kept.1.sample(at, of_corners)
     }
 
     /// Diagonal of a cell's box.

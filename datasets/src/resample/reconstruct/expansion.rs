@@ -51,18 +51,16 @@ pub(super) enum State {
 /// in stretched cells, a polynomial in lengths would have coefficients whose sum loses all digits.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::resample) struct Expansion {
-    /// Lower triangle of the matrix from distances to the frame: xx, yx, yy, zx, zy, zz.
-    frame: [f32; 6],
-    /// What is added to the point's value, and the coefficients of the monomials.
-    constant: f32,
-    terms: [f32; TERMS],
-    bounds: Bounds,
+    parts: Parts,
     state: State,
 }
 
-/// The numbers of a polynomial, as in [`Expansion`].
+/// The numbers of an [`Expansion`].
+#[derive(Debug, Clone, Copy)]
 pub(in crate::resample) struct Parts {
+    /// Lower triangle of the matrix from distances to the frame: xx, yx, yy, zx, zy, zz.
     pub(in crate::resample) frame: [f32; 6],
+    /// What is added to the point's value, and the coefficients of the monomials.
     pub(in crate::resample) constant: f32,
     pub(in crate::resample) terms: [f32; TERMS],
     pub(in crate::resample) bounds: Bounds,
@@ -70,11 +68,13 @@ pub(in crate::resample) struct Parts {
 
 impl Parts {
     /// The same polynomial times a factor.
-    pub(in crate::resample) fn times(mut self, factor: f32) -> Parts {
-        self.terms.iter_mut().for_each(|c| *c *= factor);
-        self.constant *= factor;
-        self.bounds = self.bounds.times(factor);
-        self
+    pub(in crate::resample) fn times(&self, factor: f32) -> Parts {
+        Parts {
+            frame: self.frame,
+            constant: factor * self.constant,
+            terms: self.terms.map(|c| factor * c),
+            bounds: self.bounds.times(factor),
+        }
     }
 }
 
@@ -107,18 +107,18 @@ impl Bounds {
 impl Expansion {
     /// Adds nothing to the point's value.
     const fn nothing(state: State) -> Expansion {
-        Expansion {
+        let parts = Parts {
             frame: [0.0; 6],
             constant: 0.0,
             terms: [0.0; TERMS],
             bounds: Bounds { low: 0.0, high: 0.0, slack: 0.0 },
-            state,
-        }
+        };
+        Expansion { parts, state }
     }
 
     /// The numbers of the polynomial.
-    pub(in crate::resample) fn parts(&self) -> Parts {
-        Parts { frame: self.frame, constant: self.constant, terms: self.terms, bounds: self.bounds }
+    pub(in crate::resample) fn parts(&self) -> &Parts {
+        &self.parts
     }
 
     pub(super) fn state(&self) -> State {
@@ -145,13 +145,14 @@ impl Expansion {
     /// degree ([`factors`]).
     #[inline]
     pub(super) fn change(&self, d: DVec3, factors: [f64; 3]) -> f64 {
-        let terms = monomials(in_frame(&self.frame, d));
+        let Parts { frame, constant, terms: own, bounds } = &self.parts;
+        let terms = monomials(in_frame(frame, d));
         let of = |degree: usize| -> f64 {
             let range = TERMS_TO_DEGREE[degree - 1]..TERMS_TO_DEGREE[degree];
-            let terms = self.terms[range.clone()].iter().zip(&terms[range]);
+            let terms = own[range.clone()].iter().zip(&terms[range]);
             factors[degree - 1] * terms.map(|(c, m)| f64::from(*c) * m).sum::<f64>()
         };
-        self.bounds.bounded(f64::from(self.constant) + (of(1) + of(2) + of(3)))
+        bounds.bounded(f64::from(*constant) + (of(1) + of(2) + of(3)))
     }
 }
 
@@ -365,11 +366,9 @@ impl Fit {
         let slack = range * (beyond + (1.0 - share) * SPLINE_BEYOND);
         let (low, high) = (low - beyond * range, high + beyond * range);
         let [constant, terms @ ..] = coefficients.map(|c| c as f32);
+        let bounds = Bounds { low: low as f32, high: high as f32, slack: slack as f32 };
         Expansion {
-            frame,
-            constant,
-            terms,
-            bounds: Bounds { low: low as f32, high: high as f32, slack: slack as f32 },
+            parts: Parts { frame, constant, terms, bounds },
             state: match (share, solution.degree) {
                 (_, 0 | 1) => State::FewNeighbours,
                 (1.0, _) => State::Fitted,

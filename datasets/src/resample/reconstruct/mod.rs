@@ -29,7 +29,7 @@ mod polynomial;
 mod quartic;
 mod sample;
 
-pub(super) use expansion::{CAUTION, Expansion, FACTOR_FALL, UNRESOLVED, factors};
+pub(super) use expansion::{CAUTION, Expansion, FACTOR_FALL, Parts, UNRESOLVED, factors};
 pub(super) use polynomial::TERMS;
 
 use super::mesh::{Mesh, Shape};

@@ -5,6 +5,7 @@ use crate::resample::mesh::Mesh;
 use crate::rows::Rows;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
+use smallvec::SmallVec;
 
 /// Which points belong to which cells. Points of different blocks at the same place are one.
 pub(super) struct Incidence {
@@ -19,7 +20,7 @@ impl Incidence {
     pub(super) fn of(mesh: &Mesh) -> Incidence {
         let same = mesh.first_at_place().to_vec();
         let of_cell = |cell: usize| {
-            let ids = if mesh.is_hidden(cell) { vec![] } else { mesh.corners(cell).ids };
+            let ids = if mesh.is_hidden(cell) { SmallVec::new() } else { mesh.corners(cell).ids };
             ids.into_iter().map(|id| same[id as usize]).collect::<Vec<u32>>()
         };
         // In pieces, because a list for each cell takes more memory than the rows.
