@@ -92,6 +92,84 @@ fn a_wrong_case_names_the_file_the_place_and_a_cure() {
     }
 }
 
+/// The bytes of a text record, or a line.
+fn line(text: &str, encoding: Encoding) -> Vec<u8> {
+    match encoding {
+        Encoding::Text => format!("{text}\n").into_bytes(),
+        Encoding::C { .. } => format!("{text:80}").into_bytes(),
+        Encoding::Fortran { big } => {
+            let mark = if big { 80u32.to_be_bytes() } else { 80u32.to_le_bytes() };
+            [&mark[..], format!("{text:80}").as_bytes(), &mark[..]].concat()
+        }
+    }
+}
+
+#[test]
+fn a_file_with_all_steps_gives_that_of_the_time() {
+    for encoding in ENCODINGS {
+        let mut files = case(encoding);
+        let take = |files: &mut Vec<(String, Vec<u8>)>, name: &str| {
+            let at = files.iter().position(|f| f.0 == name).unwrap();
+            files.remove(at).1
+        };
+        for name in ["a.geo", "a.rho"] {
+            let steps = ["003", "005"].map(|n| take(&mut files, &format!("{name}{n}")));
+            let mut all = Vec::new();
+            for step in steps {
+                // The kind of a binary geometry comes once, before its steps.
+                let kind = line("", encoding).len();
+                let has_kind = name == "a.geo" && encoding != Encoding::Text;
+                let (kind, step) = step.split_at(if has_kind { kind } else { 0 });
+                if all.is_empty() {
+                    all.extend_from_slice(kind);
+                }
+                all.extend(line("BEGIN TIME STEP", encoding));
+                all.extend_from_slice(step);
+                all.extend(line("END TIME STEP", encoding));
+            }
+            files.push((name.to_string(), all));
+        }
+        let case_file = files.iter_mut().find(|f| f.0 == "a.case").unwrap();
+        let text = String::from_utf8(case_file.1.clone()).unwrap();
+        let text =
+            text.replace("1 a.geo***", "1 1 a.geo").replace("1 rho a.rho***", "1 1 rho a.rho");
+        case_file.1 = format!("{text}FILE\nfile set: 1\nnumber of steps: 2\n").into_bytes();
+        let dir = tempfile::tempdir().unwrap();
+        write(dir.path(), &files);
+        let separate = tempfile::tempdir().unwrap();
+        write(separate.path(), &case(encoding));
+        for time in [0.5, 1.5] {
+            let [one, other] = [&dir, &separate].map(|d| {
+                read(&d.path().join("a.case"), Some(time)).unwrap_or_else(|e| panic!("{e}"))
+            });
+            assert_eq!(format!("{:?}", one.dataset()), format!("{:?}", other.dataset()));
+        }
+    }
+}
+
+#[test]
+fn extents_tell_nothing_of_the_byte_order() {
+    for encoding in [Encoding::C { big: true }, Encoding::C { big: false }] {
+        let mut files = case(encoding);
+        let geometry = files.iter_mut().find(|f| f.0 == "a.geo003").unwrap();
+        let mut extents = line("extents", encoding);
+        // Of these bytes, the other order makes the smaller number.
+        for x in [-105.09, 13.28, -73.9, 73.9, 0.0, 0.0f32] {
+            extents.extend(match encoding {
+                Encoding::C { big: true } => x.to_be_bytes(),
+                _ => x.to_le_bytes(),
+            });
+        }
+        let first_part = 5 * 80;
+        geometry.1.splice(first_part..first_part, extents);
+        let dir = tempfile::tempdir().unwrap();
+        write(dir.path(), &files);
+        let file = read(&dir.path().join("a.case"), None).unwrap_or_else(|e| panic!("{e}"));
+        let Dataset::MultiBlock(blocks) = file.dataset().unwrap() else { panic!() };
+        assert_eq!(blocks.len(), 4, "{encoding:?}");
+    }
+}
+
 #[test]
 fn vtk_reads_the_same_from_a_case() {
     let Some(python) = peer::python_with_vtk("vtk_reads_the_same_from_a_case") else { return };

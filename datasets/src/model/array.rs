@@ -207,19 +207,21 @@ impl Values {
     }
 
     /// Parses the values in `words`, or returns the first word that is not a value. As some
-    /// programs write them, integers may have a fraction or exponent (`3.0`) if the value is whole.
+    /// programs write them, integers may have a fraction or exponent (`3.0`) if the value is whole,
+    /// and exponents may be those of Fortran (`1.0D-3`, `1.0-101`).
     #[allow(clippy::unnecessary_cast, reason = "the macro covers f64 too")]
     pub fn from_words<'a>(
         kind: ScalarType,
         words: impl Iterator<Item = &'a str>,
     ) -> Result<Self, &'a str> {
+        let is_real = matches!(kind, ScalarType::F32 | ScalarType::F64);
         with_type!(kind, T, wrap => {
             let mut out = Vec::new();
             for w in words {
                 let value = match w.parse::<T>() {
                     Ok(x) => x,
-                    Err(_) => match w.parse::<f64>() {
-                        Ok(f) if (f as T) as f64 == f => f as T,
+                    Err(_) => match fortran_number(w) {
+                        Some(f) if is_real || (f as T) as f64 == f => f as T,
                         _ => return Err(w),
                     },
                 };
@@ -372,5 +374,37 @@ impl Attributes {
     /// The field array of this name.
     pub fn field_array(&self, name: &str) -> Option<&DataArray> {
         self.field.iter().find(|a| a.name == name)
+    }
+}
+
+/// A number as Fortran writes it: the letter of the exponent may be D, or be missing (`1.0-101`).
+pub(crate) fn fortran_number(word: &str) -> Option<f64> {
+    if let Ok(x) = word.parse() {
+        return Some(x);
+    }
+    if let Ok(x) = word.replace(['d', 'D'], "e").parse() {
+        return Some(x);
+    }
+    let at = word.rfind(['+', '-']).filter(|&at| at > 0)?;
+    format!("{}e{}", &word[..at], &word[at..]).parse().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_of_fortran_have_any_exponent() {
+        let words = ["1.5D+02", "3.300003+000", "-2.5-101", "4d0"];
+        let values = Values::from_words(ScalarType::F64, words.into_iter()).unwrap();
+        assert!(matches!(&values, Values::F64(v) if *v == [150.0, 3.300003, -2.5e-101, 4.0]));
+        let single = Values::from_words(ScalarType::F32, words[..2].iter().copied()).unwrap();
+        assert!(matches!(&single, Values::F32(v) if *v == [150.0, 3.300003]));
+        let whole = Values::from_words(ScalarType::I32, ["3.0D1"].into_iter()).unwrap();
+        assert!(matches!(&whole, Values::I32(v) if *v == [30]));
+        for wrong in ["1.5D", "+-3", "3+", "x-1", "1-2-3"] {
+            assert!(Values::from_words(ScalarType::F64, [wrong].into_iter()).is_err(), "{wrong}");
+        }
+        assert!(Values::from_words(ScalarType::I32, ["1.5D0"].into_iter()).is_err());
     }
 }

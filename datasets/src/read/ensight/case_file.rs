@@ -6,6 +6,8 @@ use crate::read::error::{At, Fault};
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Timed {
     pub(super) set: Option<i64>,
+    /// The file has all steps of the set, one after the other.
+    pub(super) has_all_steps: bool,
     pub(super) name: String,
 }
 
@@ -57,17 +59,25 @@ const SECTIONS: [&str; 8] =
     ["FORMAT", "GEOMETRY", "VARIABLE", "TIME", "FILE", "MATERIAL", "BLOCK_CONTINUATION", "SCRIPTS"];
 
 impl CaseFile {
+    fn set_of(&self, timed: &Timed) -> Option<&TimeSet> {
+        match timed.set {
+            Some(id) => self.sets.iter().find(|s| s.id == id),
+            None => self.sets.first(),
+        }
+    }
+
+    /// The step of a file at a time, if it has all of them.
+    pub(super) fn step_in_file(&self, timed: &Timed, time: Option<f64>) -> Option<usize> {
+        timed.has_all_steps.then(|| self.set_of(timed).map_or(0, |set| set.step(time)))
+    }
+
     /// The file of a name at a time.
     pub(super) fn file_at(&self, timed: &Timed, time: Option<f64>) -> Result<String, Fault> {
         let stars = timed.name.bytes().filter(|b| *b == b'*').count();
         if stars == 0 {
             return Ok(timed.name.clone());
         }
-        let set = match timed.set {
-            Some(id) => self.sets.iter().find(|s| s.id == id),
-            None => self.sets.first(),
-        };
-        let Some(set) = set else {
+        let Some(set) = self.set_of(timed) else {
             let what = format!("`{}` changes with time, but has no time set", timed.name);
             return Err(Fault::new(At::Field("TIME".into()), what, "add its time set"));
         };
@@ -129,9 +139,12 @@ pub(super) fn parse(text: &str) -> Result<CaseFile, Fault> {
             "GEOMETRY" => case.warnings.push(format!("{key} ({}) left out", short(value))),
             "VARIABLE" => variable(&mut case, &key, value, &at)?,
             "TIME" => time_key(&mut case, &key, value, &at)?,
+            // Names say which files have all steps; the file says where each begins.
+            "FILE" if matches!(&*key, "file set" | "number of steps") => {}
             "FILE" => {
-                let what = format!("{key}: {}: all steps in one file", short(value));
-                let cure = "write one file for each step (a name with ***)";
+                let what =
+                    format!("{key}: {}: steps in several files with some each", short(value));
+                let cure = "write all steps to one file, or a file for each (a name with ***)";
                 return Err(Fault::unsupported(at, what, cure));
             }
             _ => {
@@ -172,11 +185,12 @@ fn timed(value: &str, words: usize, at: &At) -> Result<(Vec<String>, Timed), Fau
     }
     parts.retain(|p| p != "change_coords_only");
     let number = |p: Option<&String>| p.and_then(|p| p.parse::<i64>().ok());
-    let mut set = None;
+    let (mut set, mut has_all_steps) = (None, false);
     if parts.len() > words + 1 && number(parts.first()).is_some() {
         set = number(parts.first());
         parts.remove(0);
         if parts.len() > words + 1 && number(parts.first()).is_some() {
+            has_all_steps = true;
             parts.remove(0);
         }
     }
@@ -185,7 +199,7 @@ fn timed(value: &str, words: usize, at: &At) -> Result<(Vec<String>, Timed), Fau
         return Err(Fault::new(at.clone(), what, "add the name of the file"));
     }
     let name = parts.remove(words);
-    Ok((parts, Timed { set, name }))
+    Ok((parts, Timed { set, has_all_steps, name }))
 }
 
 fn variable(case: &mut CaseFile, key: &str, value: &str, at: &At) -> Result<(), Fault> {

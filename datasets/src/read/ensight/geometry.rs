@@ -46,10 +46,7 @@ const POLYGON: u8 = 7;
 const POLYHEDRON: u8 = 42;
 
 /// Reads the parts.
-pub(super) fn read(s: &mut Source<'_>, binary: bool) -> Result<Vec<Part>, Fault> {
-    if binary {
-        s.need_text("the kind of the file")?;
-    }
+pub(super) fn read(s: &mut Source<'_>) -> Result<Vec<Part>, Fault> {
     s.need_text("the description")?;
     s.need_text("the description")?;
     let ids = |line: String| {
@@ -60,7 +57,7 @@ pub(super) fn read(s: &mut Source<'_>, binary: bool) -> Result<Vec<Part>, Fault>
     let element_ids = ids(s.need_text("`element id`")?);
     if s.peek().is_some_and(|t| t.starts_with("extents")) {
         s.keyword()?;
-        s.reals(6, "extents")?;
+        s.skip_reals(6, "extents")?;
     }
     let mut parts: Vec<Part> = Vec::new();
     while let Some(word) = s.keyword()? {

@@ -53,7 +53,13 @@ pub(crate) fn read(path: &Path, options: &OpenOptions) -> Result<LoadedFile, Rea
     let binary = head.trim_start().starts_with("c binary")
         || head.trim_start().starts_with("fortran binary");
     let mut s = Source::new(&plain, binary, order);
-    let mut parts = geometry::read(&mut s, binary).map_err(in_geometry)?;
+    if binary {
+        s.need_text("the kind of the file").map_err(in_geometry)?;
+    }
+    if let Some(step) = case.step_in_file(model, time) {
+        s.go_to_step(step).map_err(in_geometry)?;
+    }
+    let mut parts = geometry::read(&mut s).map_err(in_geometry)?;
     if parts.is_empty() {
         return Err(in_geometry(Fault::field("the geometry", "it has no parts")));
     }
@@ -65,6 +71,9 @@ pub(crate) fn read(path: &Path, options: &OpenOptions) -> Result<LoadedFile, Rea
             if binary { source::without_records(&content) } else { plain_text(&content) };
         let (plain, order) = stripped.map_err(in_file)?;
         let mut s = Source::new(&plain, binary, order);
+        if let Some(step) = case.step_in_file(&v.file, time) {
+            s.go_to_step(step).map_err(in_file)?;
+        }
         variables::read(&mut s, v, &mut parts, &mut warnings).map_err(in_file)?;
     }
     let mut blocks: Vec<Block> =

@@ -60,6 +60,30 @@ impl<'a> Source<'a> {
         Source { cursor: Cursor::new(data), binary, endian }
     }
 
+    /// Goes to a step of a file that has all of them, between the lines BEGIN TIME STEP and END
+    /// TIME STEP. A file without these lines is its only step.
+    pub(super) fn go_to_step(&mut self, step: usize) -> Result<(), Fault> {
+        const BEGIN: &[u8] = b"BEGIN TIME STEP";
+        const END: &[u8] = b"END TIME STEP";
+        let data = self.cursor.data;
+        let find = |what: &[u8], from: usize| {
+            let rest = data.get(from..).unwrap_or_default();
+            rest.windows(what.len()).position(|w| w == what).map(|at| from + at)
+        };
+        let Some(mut begin) = find(BEGIN, 0) else {
+            let what = format!("step {}, but no line BEGIN TIME STEP", step + 1);
+            return if step == 0 { Ok(()) } else { Err(self.fault(what)) };
+        };
+        for n in 0..step {
+            begin = find(BEGIN, begin + BEGIN.len()).ok_or_else(|| {
+                Fault::new(self.at(), format!("{} steps, not {}", n + 1, step + 1), TRUNCATED)
+            })?;
+        }
+        let end = find(END, begin).unwrap_or(data.len());
+        self.cursor = Cursor { data: &data[..end], pos: begin };
+        self.text().map(drop)
+    }
+
     pub(super) fn at(&self) -> At {
         if self.binary {
             return self.cursor.at();
@@ -139,6 +163,15 @@ impl<'a> Source<'a> {
             Values::F32(v) => Ok(v),
             other => Ok(other.to_f32()),
         }
+    }
+
+    /// Passes numbers that nobody needs. They tell nothing of the byte order: the first whole number
+    /// does.
+    pub(super) fn skip_reals(&mut self, count: u64, what: &str) -> Result<(), Fault> {
+        if self.binary {
+            return self.cursor.take(count, 4, what).map(drop);
+        }
+        self.reals(count, what).map(drop)
     }
 
     pub(super) fn ints(&mut self, count: u64, what: &str) -> Result<Vec<i32>, Fault> {

@@ -6,6 +6,7 @@ mod layout;
 
 use super::error::{At, BROKEN, Cursor, Fault, TRUNCATED, fits, read_bytes};
 use super::{Content, LoadedFile, ReadError};
+use crate::model::array::fortran_number;
 use crate::model::{
     Attributes, Block, DataArray, Dataset, Endian, Points, ScalarType, StructuredGrid, Values,
 };
@@ -382,13 +383,13 @@ fn text_blocks(role: Role, bytes: &[u8], options: &Plot3dOptions) -> Result<Bloc
     Err(Fault::new(At::Byte(0), what, TRUNCATED))
 }
 
-/// Parses numbers as Fortran writes them: the exponent letter may be D.
+/// Parses numbers as Fortran writes them.
 fn reals(words: &[&str]) -> Result<Vec<f64>, Fault> {
     words
         .iter()
         .map(|w| {
-            let number = w.parse().or_else(|_| w.replace(['d', 'D'], "e").parse());
-            number.map_err(|_| Fault::field("the numbers", format!("`{w}` is not a number")))
+            let wrong = || Fault::field("the numbers", format!("`{w}` is not a number"));
+            fortran_number(w).ok_or_else(wrong)
         })
         .collect()
 }

@@ -160,18 +160,6 @@ pub(super) fn short(word: &str) -> String {
     word.chars().take(40).collect()
 }
 
-/// A number as Fortran writes it: the letter of the exponent may be D, or be missing (`1.0-101`).
-pub(super) fn real(word: &str) -> Option<f64> {
-    if let Ok(x) = word.parse() {
-        return Some(x);
-    }
-    if let Ok(x) = word.replace(['d', 'D'], "e").parse() {
-        return Some(x);
-    }
-    let at = word.rfind(['+', '-']).filter(|&at| at > 0)?;
-    format!("{}e{}", &word[..at], &word[at..]).parse().ok()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -192,15 +180,5 @@ mod tests {
         s.equals("VARLOCATION").unwrap();
         assert_eq!(s.value().unwrap(), Value::List("[3]=NODAL"));
         assert_eq!((s.peek(), s.word()), (None, None));
-    }
-
-    #[test]
-    fn numbers_of_fortran() {
-        for (word, value) in
-            [("1.5", 1.5), ("1.5D-3", 1.5e-3), ("-1.0-101", -1e-101), ("2.5+102", 2.5e102)]
-        {
-            assert_eq!(real(word), Some(value), "{word}");
-        }
-        assert_eq!((real("-"), real("x"), real("1-2-3")), (None, None, None));
     }
 }

@@ -2,11 +2,12 @@
 //!
 //! Source: Tecplot 360 Data Format Guide, chapter "ASCII data".
 
-use super::scanner::{Scanner, real, short};
+use super::scanner::{Scanner, short};
 use super::text_zone::{self, is_record, zone_header};
 use super::zone::{Shape, Zone, ZoneHeader};
 use super::{FORMAT_CURE, File};
 use crate::model::Values;
+use crate::model::array::fortran_number;
 use crate::read::error::{Fault, TRUNCATED};
 use std::rc::Rc;
 
@@ -65,7 +66,7 @@ pub(super) fn read(text: &str) -> Result<File, Fault> {
                 }
                 skip_record(&mut s)?;
             }
-            _ if real(&word).is_some() && !file.zones.is_empty() => {
+            _ if fortran_number(&word).is_some() && !file.zones.is_empty() => {
                 let zone = &file.zones[file.zones.len() - 1].header;
                 let what =
                     format!("`{}`: there are more numbers than zone `{}` has", word, zone.title);
@@ -167,7 +168,7 @@ fn reals(
     }
     let mut out = Vec::with_capacity(count.min(s.remaining() as u64) as usize);
     while (out.len() as u64) < count {
-        let (times, value) = s.repeated(what, real)?;
+        let (times, value) = s.repeated(what, fortran_number)?;
         if times > count - out.len() as u64 {
             let what = format!("{times} times {value} among the {}, which are {count}", what());
             return Err(s.fault(what));

@@ -1,9 +1,10 @@
 //! The header of a zone in a Tecplot text file, and the lists in it.
 
 use super::File;
-use super::scanner::{Scanner, Value, real, short};
+use super::scanner::{Scanner, Value, short};
 use super::shapes::Element;
 use super::zone::{Shape, ZoneHeader};
+use crate::model::array::fortran_number;
 use crate::read::error::{At, BROKEN, Fault, fits};
 
 /// Words that begin a record.
@@ -59,7 +60,7 @@ pub(super) fn zone_header(s: &mut Scanner<'_>, file: &File) -> Result<(ZoneHeade
             break;
         }
     }
-    let first_of = |w: &str| real(w.split('*').next_back().unwrap_or(w)).is_some();
+    let first_of = |w: &str| fortran_number(w.split('*').next_back().unwrap_or(w)).is_some();
     match s.next_word() {
         Some(word) if !first_of(word) && !is_record(word) => {
             s.peek();
@@ -91,7 +92,7 @@ fn apply(
         "N" | "NODES" => keys.points = Some(number()?),
         "E" | "ELEMENTS" => keys.elements = Some(number()?),
         "SOLUTIONTIME" => {
-            let time = real(text).filter(|t| t.is_finite());
+            let time = fortran_number(text).filter(|t| t.is_finite());
             let fault = || out_of_range(at.clone(), &h.title, key, text);
             h.time = Some(time.ok_or_else(fault)?);
         }
