@@ -551,6 +551,10 @@ fn legacy_binary_and_text_mean_what_they_say() {
     assert_eq!((g.types.as_slice(), g.cells.get(1)), (&[10u8, 5][..], &[1u32, 2, 4][..]));
     assert_eq!(g.attributes.cell_array("id").unwrap().values, Values::I32(vec![7, 8]));
     assert_eq!(g.attributes.point_scalars.as_deref(), Some("s"));
+    // Files of version 1 have an empty line after the title.
+    let old = sample_files::LEGACY_GRID.replacen("Version 3.0", "Version 1.0", 1);
+    let old = old.replacen("ASCII\n", "\nASCII\n\n", 1);
+    assert_eq!(data(opened("old.vtk", old.as_bytes())), Dataset::UnstructuredGrid(g));
 }
 
 #[test]

@@ -69,17 +69,25 @@ fn parse(bytes: &[u8], warnings: &mut Vec<String>) -> Result<Dataset, Fault> {
     };
     let major: u32 = version.split('.').next().and_then(|v| v.parse().ok()).unwrap_or(3);
     input.offsets_and_connectivity = major >= 5;
+    // The title, which may be empty; after it, files of version 1 have an empty line.
     input.cursor.line();
-    input.binary =
-        match input.cursor.line().unwrap_or_default().trim().to_ascii_uppercase().as_str() {
-            "ASCII" => false,
-            "BINARY" => true,
-            other => {
-                let what =
-                    format!("the third line is `{}`", other.chars().take(40).collect::<String>());
-                return Err(Fault::new(At::Line(3), what, "it must be ASCII or BINARY"));
-            }
-        };
+    let mut number = 2;
+    let encoding = loop {
+        number += 1;
+        match input.cursor.line() {
+            Some(line) if line.trim().is_empty() => {}
+            line => break line.unwrap_or_default().trim().to_ascii_uppercase(),
+        }
+    };
+    input.binary = match encoding.as_str() {
+        "ASCII" => false,
+        "BINARY" => true,
+        other => {
+            let shown: String = other.chars().take(40).collect();
+            let what = format!("the line after the title is `{shown}`");
+            return Err(Fault::new(At::Line(number), what, "it must be ASCII or BINARY"));
+        }
+    };
 
     let mut kind = String::new();
     let mut parts = Parts { dims: [0; 3], ..Default::default() };
