@@ -3,6 +3,7 @@
 //! Source: the MetaIO documentation at itk.org/Wiki/MetaIO/Documentation.
 
 use super::error::{At, BROKEN, Cursor, Fault, read_bytes, sibling_path};
+use super::value_files;
 use super::volume::{Packing, ValuesPlace, Volume, start_of_file};
 use super::{Content, LoadedFile, OpenOptions, ReadError};
 use crate::model::{Endian, ScalarType};
@@ -39,7 +40,11 @@ pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadErro
     let mut warnings = Vec::new();
     let (header, body) = Header::parse(bytes).map_err(fault)?;
     let volume = header.volume(path).map_err(fault)?;
-    let (packing, name) = (header.packing(), header.data_file().map_err(fault)?);
+    let (packing, name) = (header.packing(), header.need("ElementDataFile").map_err(fault)?);
+    if let Some(names) = value_files::names(name, body).map_err(fault)? {
+        let size = volume.clone().part(names.len());
+        return value_files::read(path, &names, volume, packing, FORMAT, |d| header.skip(d, &size));
+    }
     let read = |data: &[u8], warnings: &mut Vec<String>| {
         header.skip(data, &volume).and_then(|d| volume.clone().read(d, packing, warnings))
     };
@@ -57,13 +62,16 @@ pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadErro
     })
 }
 
-/// Where the values are.
+/// Where the values are; `None` where they are in several files.
 pub(super) fn place_of_values(path: &Path) -> Result<Option<ValuesPlace>, ReadError> {
     let fault = |f: Fault| f.in_file(path, FORMAT);
     let start = start_of_file(path)?;
     let (header, body) = Header::parse(&start).map_err(fault)?;
     let volume = header.volume(path).map_err(fault)?;
-    let (packing, name) = (header.packing(), header.data_file().map_err(fault)?);
+    let (packing, name) = (header.packing(), header.need("ElementDataFile").map_err(fault)?);
+    if value_files::names(name, body).map_err(fault)?.is_some() {
+        return Ok(None);
+    }
     let (file, before) = if name.eq_ignore_ascii_case("LOCAL") {
         (path.to_path_buf(), (start.len() - body.len()) as u64)
     } else {
@@ -134,17 +142,6 @@ impl Header {
             true => Packing::Deflate,
             false => Packing::Raw,
         }
-    }
-
-    /// The file with the values, or `LOCAL`.
-    fn data_file(&self) -> Result<&str, Fault> {
-        let name = self.need("ElementDataFile")?;
-        if name.starts_with("LIST") || name.contains('%') {
-            let what = format!("ElementDataFile = {name}: several data files");
-            let cure = "write it again as one file";
-            return Err(Fault::unsupported(At::Field("ElementDataFile".into()), what, cure));
-        }
-        Ok(name)
     }
 
     fn bytes_to_skip(&self) -> Result<i64, Fault> {

@@ -4,6 +4,7 @@
 //! Source: the definition of the format at teem.sourceforge.net/nrrd/format.html.
 
 use super::error::{At, BROKEN, Cursor, Fault, read_bytes, sibling_path};
+use super::value_files;
 use super::volume::{Packing, ValuesPlace, Volume, start_of_file};
 use super::{Content, LoadedFile, OpenOptions, ReadError};
 use crate::model::{Endian, ScalarType};
@@ -40,7 +41,17 @@ pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadErro
     let (header, body) = Header::parse(bytes).map_err(fault)?;
     let volume = header.volume(path, &mut warnings).map_err(fault)?;
     let packing = header.packing().map_err(fault)?;
-    let data = match header.data_file().map_err(fault)? {
+    let data_file = header.get(&["data file", "datafile"]);
+    let names = value_files::names(data_file.unwrap_or_default(), body).map_err(fault)?;
+    if let Some(names) = names {
+        let size = volume.clone().part(names.len());
+        let mut file = value_files::read(path, &names, volume, packing, FORMAT, |data| {
+            header.skip(data, &size, packing)
+        })?;
+        file.warnings.splice(0..0, warnings);
+        return Ok(file);
+    }
+    let data = match data_file {
         None => header
             .skip(body, &volume, packing)
             .and_then(|d| volume.clone().read(d, packing, &mut warnings))
@@ -62,14 +73,19 @@ pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadErro
     })
 }
 
-/// Where the values are; `None` where lines must be skipped to find them.
+/// Where the values are; `None` where lines must be skipped to find them, or they are in several
+/// files.
 pub(super) fn place_of_values(path: &Path) -> Result<Option<ValuesPlace>, ReadError> {
     let fault = |f: Fault| f.in_file(path, FORMAT);
     let start = start_of_file(path)?;
     let (header, body) = Header::parse(&start).map_err(fault)?;
     let volume = header.volume(path, &mut Vec::new()).map_err(fault)?;
     let packing = header.packing().map_err(fault)?;
-    let (file, before) = match header.data_file().map_err(fault)? {
+    let data_file = header.get(&["data file", "datafile"]);
+    if value_files::names(data_file.unwrap_or_default(), body).map_err(fault)?.is_some() {
+        return Ok(None);
+    }
+    let (file, before) = match data_file {
         None => (path.to_path_buf(), (start.len() - body.len()) as u64),
         Some(name) => (sibling_path(path, name), 0),
     };
@@ -117,7 +133,13 @@ impl Header {
                     BROKEN,
                 ));
             };
-            fields.insert(name.trim().to_ascii_lowercase(), value.trim().to_string());
+            let (name, value) = (name.trim().to_ascii_lowercase(), value.trim().to_string());
+            // The names of the files follow, instead of an empty line.
+            let last = value.starts_with("LIST") && matches!(&*name, "data file" | "datafile");
+            fields.insert(name, value);
+            if last {
+                break;
+            }
         }
         Ok((Header { fields }, &bytes[cursor.pos..]))
     }
@@ -128,17 +150,6 @@ impl Header {
 
     fn need(&self, name: &str) -> Result<&str, Fault> {
         self.get(&[name]).ok_or_else(|| Fault::field(format!("field `{name}`"), "it is missing"))
-    }
-
-    /// The file with the values, if it is another one.
-    fn data_file(&self) -> Result<Option<&str>, Fault> {
-        let name = self.get(&["data file", "datafile"]);
-        if let Some(name) = name.filter(|name| name.starts_with("LIST") || name.contains('%')) {
-            let what = format!("data file `{name}`: several data files");
-            let cure = "join them into one file, for example with `unu join` or `unu save`";
-            return Err(Fault::unsupported(At::Field("data file".into()), what, cure));
-        }
-        Ok(name)
     }
 
     /// A whole number; 0 where the field is missing.

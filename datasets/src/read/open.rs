@@ -12,7 +12,7 @@ use std::io::Read;
 use std::path::Path;
 
 /// The supported formats, for messages.
-pub const KNOWN: &str = "VTK XML (.vti .vtp .vtu .vtr .vts, their parallel forms, .pvd, .vtm, .series), VTK \
+pub const KNOWN: &str = "VTK XML (.vti .vtp .vtu .vtr .vts, their parallel forms, .pvd, .vtm, .vthb, .series), VTK \
                          legacy (.vtk), VTKHDF (.vtkhdf), NetCDF (.nc), Exodus II (.e .exo), \
                          XDMF (.xdmf .xmf), CGNS (.cgns), \
                          PLOT3D (.xyz .x .g .q .bin), NRRD (.nrrd .nhdr), MetaImage (.mhd .mha), \
@@ -265,7 +265,7 @@ fn from_name(path: &Path) -> Option<Format> {
     let extension = path.extension()?.to_str()?.to_ascii_lowercase();
     Some(match extension.as_str() {
         "vti" | "vtp" | "vtu" | "vtr" | "vts" | "pvti" | "pvtp" | "pvtu" | "pvtr" | "pvts"
-        | "pvd" | "vtm" => Format::VtkXml,
+        | "pvd" | "vtm" | "vth" | "vthb" => Format::VtkXml,
         "series" => Format::VtkSeries,
         "vtk" => Format::VtkLegacy,
         "xdmf" | "xmf" | "xdmf2" | "xdmf3" => Format::Xdmf,
@@ -293,6 +293,8 @@ fn unknown(path: &Path, head: &[u8]) -> ReadError {
         path.extension().map_or_else(|| "none".into(), |e| format!(".{}", e.to_string_lossy()));
     let what = if head.is_empty() {
         "the file is empty".to_string()
+    } else if head.starts_with(&[0x1f, 0x8b]) {
+        "compressed by gzip: unpack it first, for example with `gunzip --keep`".to_string()
     } else {
         let shown: String = head.iter().take(8).map(|b| format!("{b:02x}")).collect();
         format!("ending {extension}, first bytes {shown}")

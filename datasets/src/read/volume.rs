@@ -70,6 +70,12 @@ impl Volume {
         }
     }
 
+    /// What one of so many files with equal parts of the values has.
+    pub(super) fn part(self, files: usize) -> Volume {
+        let count = self.count().unwrap_or(0) / (files as u64).max(1);
+        Volume { dims: [count, 1, 1], components: 1, ..self }
+    }
+
     /// The volume with the numbers in `data`.
     pub(crate) fn read(
         self,
@@ -77,10 +83,21 @@ impl Volume {
         packing: Packing,
         warnings: &mut Vec<String>,
     ) -> Result<Dataset, Fault> {
-        let count = self.count()?;
+        let values = self.values(data, packing, self.count()?, warnings)?;
+        self.with_values(values)
+    }
+
+    /// So many numbers from `data`.
+    pub(super) fn values(
+        &self,
+        data: &[u8],
+        packing: Packing,
+        count: u64,
+        warnings: &mut Vec<String>,
+    ) -> Result<Values, Fault> {
         let size = self.kind.size();
-        let values = match packing {
-            Packing::Text => Cursor::new(data).numbers(self.kind, count, "values")?,
+        match packing {
+            Packing::Text => Cursor::new(data).numbers(self.kind, count, "values"),
             Packing::Raw => {
                 let mut cursor = Cursor::new(data);
                 let bytes = cursor.take(count, size, "values")?;
@@ -88,14 +105,13 @@ impl Volume {
                     warnings
                         .push(format!("{} bytes after the last value ignored", cursor.remaining()));
                 }
-                Values::from_bytes(self.kind, bytes, self.endian)
+                Ok(Values::from_bytes(self.kind, bytes, self.endian))
             }
             Packing::Deflate => {
                 let bytes = inflate(data, count.saturating_mul(size as u64))?;
-                Values::from_bytes(self.kind, &bytes, self.endian)
+                Ok(Values::from_bytes(self.kind, &bytes, self.endian))
             }
-        };
-        self.with_values(values)
+        }
     }
 
     /// The volume with the numbers read from `source` piece by piece, so that the file is never in
@@ -127,7 +143,7 @@ impl Volume {
         self.with_values(values)
     }
 
-    fn with_values(self, values: Values) -> Result<Dataset, Fault> {
+    pub(super) fn with_values(self, values: Values) -> Result<Dataset, Fault> {
         let dims = self.dims.map(|d| d as u32);
         let mut image = ImageData::new(dims, self.origin, self.spacing);
         image.direction = self.direction;

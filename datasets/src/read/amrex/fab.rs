@@ -1,9 +1,10 @@
 //! The values of a box (FAB): a line that tells type, byte order, cells and number of variables,
 //! and then one variable after the other, x fastest.
 
-use super::header::{IndexBox, index_box, integers};
+use super::header::{index_box, integers};
 use crate::model::{Endian, ScalarType, Values};
 use crate::read::error::{At, BROKEN, Cursor, Fault, TRUNCATED};
+use crate::read::refinement::IndexBox;
 
 /// The values of the variables in `cells`; the box in the file may have ghost cells around them.
 pub(super) fn read(

@@ -1,36 +1,7 @@
 //! The texts of a plotfile: `Header`, and the list of boxes of each level (`Cell_H`).
 
 use crate::read::error::{At, BROKEN, Fault, TRUNCATED};
-
-/// Cells from `low` to `high`, both included; axes that the data do not have are 0.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct IndexBox {
-    pub(super) low: [i64; 3],
-    pub(super) high: [i64; 3],
-}
-
-impl IndexBox {
-    /// The cells of a level that is coarser by `ratio`.
-    pub(super) fn coarsened(&self, ratio: i64) -> IndexBox {
-        let down = |v: [i64; 3]| v.map(|i| i.div_euclid(ratio.max(1)));
-        IndexBox { low: down(self.low), high: down(self.high) }
-    }
-    pub(super) fn intersection(&self, other: &IndexBox) -> Option<IndexBox> {
-        let low = [0, 1, 2].map(|a| self.low[a].max(other.low[a]));
-        let high = [0, 1, 2].map(|a| self.high[a].min(other.high[a]));
-        (0..3).all(|a| low[a] <= high[a]).then_some(IndexBox { low, high })
-    }
-    pub(super) fn contains(&self, other: &IndexBox) -> bool {
-        self.intersection(other) == Some(*other)
-    }
-    /// Number of cells; `None` if it does not fit.
-    pub(super) fn count(&self) -> Option<u64> {
-        (0..3).try_fold(1u64, |n, a| {
-            let along = self.high[a].checked_sub(self.low[a])?.checked_add(1)?;
-            n.checked_mul(u64::try_from(along).ok()?)
-        })
-    }
-}
+use crate::read::refinement::IndexBox;
 
 pub(super) struct Level {
     pub(super) domain: IndexBox,

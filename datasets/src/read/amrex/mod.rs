@@ -5,21 +5,18 @@
 //!
 //! Source: AMReX User's Guide, "I/O", and what `WriteMultiLevelPlotfile` and `FABio` write.
 
-mod box_tree;
 mod fab;
 mod header;
 
 use super::error::{At, BROKEN, Fault, read_bytes};
+use super::refinement::{BoxTree, IndexBox, mark_refined};
 use super::{Content, LoadedFile, OpenOptions, ReadError};
-use crate::model::{Attributes, Block, DataArray, Dataset, ImageData, Values, extent_dims};
-use box_tree::BoxTree;
+use crate::model::{Attributes, Block, DataArray, Dataset, ImageData, Values};
 use glam::DVec3;
-use header::{Header, IndexBox, boxes_of_level};
+use header::{Header, boxes_of_level};
 use std::path::{Path, PathBuf};
 
 pub(crate) const FORMAT: &str = "AMReX plotfile";
-/// `vtkGhostType` bit of cells that are covered by finer ones (vtkDataSetAttributes.h).
-const REFINED: u8 = 8;
 
 /// The header of the plotfile that a path means: a folder, or the header itself.
 pub(crate) fn header_of(path: &Path) -> Option<PathBuf> {
@@ -74,7 +71,7 @@ pub(crate) fn read(path: &Path, options: &OpenOptions) -> Result<LoadedFile, Rea
                 fab::read(bytes, b.offset, &b.cells, h.variables.len(), h.axes).map_err(in_file)?;
             let mut data = image(&h, l, &b.cells, columns).map_err(in_file)?;
             if let Some(finer) = &finer {
-                mark(&mut data, &b.cells, finer);
+                mark_refined(&mut data, &b.cells, finer);
             }
             let data = Dataset::ImageData(data);
             data.check().map_err(|e| in_file(e.into()))?;
@@ -127,23 +124,4 @@ fn image(
     }
     attributes.field.push(DataArray::new("TimeValue", 1, Values::F64(vec![h.time])));
     Ok(ImageData { extent, attributes, ..ImageData::new([1; 3], origin, spacing) })
-}
-
-/// Marks the cells that boxes of the finer level cover.
-fn mark(data: &mut ImageData, cells: &IndexBox, finer: &BoxTree) {
-    let dims = extent_dims(data.extent).map(|d| d.saturating_sub(1).max(1));
-    let mut ghosts = vec![0u8; dims.iter().product()];
-    finer.visit(cells, &mut |both| {
-        let from = |a: usize| (both.low[a] - cells.low[a]) as usize;
-        let to = |a: usize| (both.high[a] - cells.low[a]) as usize;
-        for k in from(2)..=to(2) {
-            for j in from(1)..=to(1) {
-                let row = dims[0] * (j + dims[1] * k);
-                ghosts[row + from(0)..=row + to(0)].fill(REFINED);
-            }
-        }
-    });
-    if ghosts.contains(&REFINED) {
-        data.attributes.cell.push(DataArray::new("vtkGhostType", 1, Values::U8(ghosts)));
-    }
 }

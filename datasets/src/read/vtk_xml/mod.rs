@@ -1,5 +1,5 @@
 //! VTK's XML files: one data set (`.vti .vtp .vtu .vtr .vts`), or a list of other files (`.pvti …
-//! .pvd .vtm`).
+//! .pvd .vtm .vthb`).
 //!
 //! All encodings (ascii, inline base64, appended base64, appended raw), both header types, both
 //! byte orders, ZLib and LZ4 compression. By default, ParaView writes appended raw data without
@@ -8,6 +8,7 @@
 
 pub(crate) mod blocks;
 mod file;
+mod levels;
 mod parallel;
 mod piece_files;
 pub(crate) mod pieces;
@@ -86,10 +87,11 @@ fn from_bytes(
         || kind == "vtkPartitionedDataSet"
     {
         parallel::multi_block(path, set, depth, 0, &mut warnings)?
+    } else if levels::KINDS.contains(&kind.as_str()) {
+        levels::read(path, set, depth, &mut warnings)?
     } else {
         let known = "PolyData, UnstructuredGrid, ImageData, RectilinearGrid, StructuredGrid, their \
-                     parallel forms, \
-                     Collection and vtkMultiBlockDataSet are";
+                     parallel forms, Collection, vtkMultiBlockDataSet and vtkOverlappingAMR are";
         let at = At::Field("attribute `type` of VTKFile".into());
         return Err(fault(Fault::unsupported(
             at,

@@ -51,7 +51,7 @@ pub(super) fn pieces(
 }
 
 /// Reads the data set in `file`, which `path` names.
-fn nested(
+pub(super) fn nested(
     path: &Path,
     file: &Path,
     depth: usize,
@@ -143,11 +143,16 @@ pub(super) fn multi_block(
             || node.attribute("index").map_or_else(|| blocks.len().to_string(), str::to_string);
         let name = node.attribute("name").map_or_else(number, str::to_string);
         let data = match node.tag_name().name() {
-            "DataSet" | "Piece" => match node.attribute("file") {
-                Some(file) => nested(path, &sibling_path(path, file), depth, warnings)?,
-                None => continue, // an empty slot
-            },
-            "Block" | "Partitions" => multi_block(path, node, depth, level + 1, warnings)?,
+            "DataSet" | "Piece" if node.has_attribute("file") => {
+                let file = node.attribute("file").unwrap_or_default();
+                nested(path, &sibling_path(path, file), depth, warnings)?
+            }
+            // One without a file is an empty slot, but a piece may hold others.
+            "DataSet" => continue,
+            "Piece" if !node.children().any(|n| n.is_element()) => continue,
+            "Block" | "Partitions" | "Piece" => {
+                multi_block(path, node, depth, level + 1, warnings)?
+            }
             _ => continue,
         };
         blocks.push(Block { name, data });

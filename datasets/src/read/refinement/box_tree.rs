@@ -1,20 +1,20 @@
 //! The boxes of a level that meet a box: a tree of bounding boxes, split at the median along the
 //! longest side. A level of n boxes costs n log n, not n for each box of the coarser one.
 
-use super::header::IndexBox;
+use super::index_box::IndexBox;
 
 /// Boxes that are compared one by one.
 const LEAF: usize = 8;
 
 /// Boxes in the order of the tree: the middle of a range splits it.
-pub(super) struct BoxTree {
+pub(in crate::read) struct BoxTree {
     boxes: Vec<IndexBox>,
     /// The bounds of the range whose middle is here.
     bounds: Vec<IndexBox>,
 }
 
 impl BoxTree {
-    pub(super) fn new(boxes: impl Iterator<Item = IndexBox>) -> BoxTree {
+    pub(in crate::read) fn new(boxes: impl Iterator<Item = IndexBox>) -> BoxTree {
         let mut boxes: Vec<IndexBox> = boxes.collect();
         let mut bounds = boxes.clone();
         split(&mut boxes, &mut bounds);
@@ -22,7 +22,7 @@ impl BoxTree {
     }
 
     /// Calls `found` with what each box has in common with `other`.
-    pub(super) fn visit(&self, other: &IndexBox, found: &mut dyn FnMut(IndexBox)) {
+    pub(in crate::read) fn visit(&self, other: &IndexBox, found: &mut dyn FnMut(IndexBox)) {
         self.visit_range(0, self.boxes.len(), other, found);
     }
 
