@@ -195,6 +195,10 @@ fn links_lead_to_files_of_the_folder_and_nowhere_else() {
 fn files_in_adf_are_named_with_the_tool_that_converts_them() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("old.cgns");
+    let of_version_b = b"\xc0\xa8\xa3\xa9ADF Database Version B02012>\0\0\0";
+    std::fs::write(&path, of_version_b).unwrap();
+    let error = open(&path).map(|_| ()).unwrap_err().to_string();
+    assert!(error.contains("in ADF") && error.contains("cgnsconvert -h"), "{error}");
     std::fs::write(&path, b"@(#)ADF Database Version A02011>\0\0\0").unwrap();
     let error = open(&path).unwrap_err().to_string();
     assert!(error.contains("in ADF") && error.contains("cgnsconvert -h"), "{error}");

@@ -33,9 +33,10 @@ pub(crate) const VERSION_NODE: &str = "CGNSLibraryVersion";
 /// The first bytes of a file in the format that came before HDF5.
 const ADF: &[u8] = b"@(#)ADF Database Version";
 
-/// Whether the first bytes are those of a CGNS file in ADF.
+/// Whether the first bytes are those of a CGNS file in ADF. Of version B, the first four letters
+/// have the highest bit set.
 pub(crate) fn begins_as_adf(head: &[u8]) -> bool {
-    head.starts_with(ADF)
+    head.len() >= ADF.len() && head.iter().zip(ADF).all(|(a, b)| a & 0x7f == *b)
 }
 
 /// Reads a file, or one of its times.
