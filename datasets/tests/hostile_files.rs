@@ -7,7 +7,7 @@ use datasets::read::{self, Content, LoadedFile, ReadError};
 use peak_alloc::PeakAlloc;
 use proptest::prelude::*;
 use sample_files::openfoam::{Form, case, collated, decomposed, write};
-use sample_files::{amrex, ensight};
+use sample_files::{amrex, ensight, several};
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
@@ -291,6 +291,28 @@ proptest! {
         let dir = tempfile::tempdir().unwrap();
         amrex::write(dir.path(), &files);
         if let Err(e) = open_and_use(dir.path()) {
+            prop_assert!(e.to_string().contains("; "), "no cure in: {e}");
+        }
+        }
+
+    #[test]
+    fn every_damage_to_levels_and_slices_is_survived(
+        which in 0usize..4,
+        damages in prop::collection::vec(damage(), 1..4),
+    ) {
+        let dir = tempfile::tempdir().unwrap();
+        several::write_boxes(dir.path());
+        several::write_slices(dir.path(), &vec![vec![7; 12]; 4], b"");
+        let (name, text) = match which {
+            0 => ("a.vthb", several::levels("vtkOverlappingAMR", "1.1", "spacing=\"1 1 1\"")),
+            1 => ("a.nhdr", several::nrrd_of_slices("raw", "data file: s.%03d 7 10 1\n")),
+            2 => ("a.nhdr", several::nrrd_of_slices("raw", "data file: LIST\ns.007\ns.008\n")),
+            _ => ("a.mhd", several::metaimage_of_slices("s.%03d 7 10 1\n")),
+        };
+        let mut bytes = text.into_bytes();
+        damages.iter().for_each(|d| apply(&mut bytes, d));
+        std::fs::write(dir.path().join(name), bytes).unwrap();
+        if let Err(e) = open_and_use(&dir.path().join(name)) {
             prop_assert!(e.to_string().contains("; "), "no cure in: {e}");
         }
         }

@@ -1,20 +1,14 @@
 //! Data sets in several files: levels of refinement, pieces within blocks, slices of volumes.
 
-use datasets::model::{Dataset, ImageData, Values};
+mod sample_files;
+
+use datasets::model::{Dataset, Values};
 use datasets::read::{LoadedFile, open};
-use glam::DVec3;
+use sample_files::several::{
+    levels, metaimage_of_slices, nrrd_of_slices, write_box, write_boxes, write_slices,
+};
 use std::io::Write as _;
 use std::path::Path;
-
-/// Image data with this many cells, a cell array `rho` of this value.
-fn vti(path: &Path, cells: [u32; 3], origin: [f64; 3], spacing: f64, rho: f32) {
-    let points = cells.map(|n| n + 1);
-    let mut image = ImageData::new(points, DVec3::from(origin), DVec3::splat(spacing));
-    let values = Values::F32(vec![rho; cells.iter().product::<u32>() as usize]);
-    image.attributes.cell.push(datasets::model::DataArray::new("rho", 1, values));
-    let options = datasets::write::VtkOptions::default();
-    datasets::write::write_vtk(path, &Dataset::ImageData(image), options).unwrap();
-}
 
 fn blocks(file: LoadedFile) -> Vec<(String, Dataset)> {
     let Ok(Dataset::MultiBlock(blocks)) = file.dataset().cloned() else { panic!("blocks") };
@@ -32,21 +26,7 @@ fn refined(data: &Dataset) -> Vec<usize> {
 fn cells_that_a_finer_level_covers_are_marked_in_every_version() {
     let dir = tempfile::tempdir().unwrap();
     let at = |name: &str| dir.path().join(name);
-    // A level of 4 x 2 x 2 cells, of which two have cells of half the width: cells 1 and 2 of the
-    // first row. In one of these a third level has four cells of a quarter of that.
-    vti(&at("0.vti"), [4, 2, 2], [-1.0, 0.0, 0.0], 1.0, 1.0);
-    vti(&at("1.vti"), [4, 2, 2], [0.0, 0.0, 0.0], 0.5, 2.0);
-    vti(&at("2.vti"), [4, 4, 4], [0.5, 0.0, 0.0], 0.125, 3.0);
-    let grouped = |kind: &str, version: &str, level: &str| {
-        format!(
-            "<VTKFile type=\"{kind}\" version=\"{version}\"><{kind} origin=\"-1 0 0\">\
-             <Block level=\"0\" {level}><DataSet index=\"0\" amr_box=\"0 3 0 1 0 1\" \
-             file=\"0.vti\"/></Block>\
-             <Block level=\"1\"><DataSet index=\"0\" amr_box=\"2 5 0 1 0 1\" file=\"1.vti\"/>\
-             </Block><Block level=\"2\"><DataSet index=\"0\" amr_box=\"12 15 0 3 0 3\" \
-             file=\"2.vti\"/><DataSet index=\"1\"/></Block></{kind}></VTKFile>"
-        )
-    };
+    write_boxes(dir.path());
     let flat = "<VTKFile type=\"vtkHierarchicalBoxDataSet\" version=\"0.1\">\
         <vtkHierarchicalBoxDataSet><RefinementRatio level=\"0\" refinement=\"2\"/>\
         <DataSet group=\"0\" dataset=\"0\" amr_box=\"0 3 0 1 0 1\" file=\"0.vti\"/>\
@@ -54,8 +34,8 @@ fn cells_that_a_finer_level_covers_are_marked_in_every_version() {
         <DataSet group=\"2\" dataset=\"0\" amr_box=\"12 15 0 3 0 3\" file=\"2.vti\"/>\
         </vtkHierarchicalBoxDataSet></VTKFile>";
     for text in [
-        grouped("vtkOverlappingAMR", "1.1", "spacing=\"1 1 1\""),
-        grouped("vtkHierarchicalBoxDataSet", "1.0", "refinement_ratio=\"2\""),
+        levels("vtkOverlappingAMR", "1.1", "spacing=\"1 1 1\""),
+        levels("vtkHierarchicalBoxDataSet", "1.0", "refinement_ratio=\"2\""),
         flat.to_string(),
     ] {
         std::fs::write(at("a.vthb"), text).unwrap();
@@ -74,7 +54,7 @@ fn cells_that_a_finer_level_covers_are_marked_in_every_version() {
         ("level=\"2\"", "level=\"99\"", "level"),
         ("12 15", "99999999999 15", "6 numbers"),
     ] {
-        let text = grouped("vtkOverlappingAMR", "1.1", "").replacen(from, to, 1);
+        let text = levels("vtkOverlappingAMR", "1.1", "").replacen(from, to, 1);
         std::fs::write(at("a.vthb"), text).unwrap();
         let error = open(at("a.vthb")).map(|_| ()).unwrap_err().to_string();
         assert!(error.contains("a.vthb") && error.contains(word), "{error}");
@@ -85,8 +65,8 @@ fn cells_that_a_finer_level_covers_are_marked_in_every_version() {
 fn a_piece_that_holds_files_is_not_empty() {
     let dir = tempfile::tempdir().unwrap();
     let at = |name: &str| dir.path().join(name);
-    vti(&at("0.vti"), [1, 1, 1], [0.0; 3], 1.0, 1.0);
-    vti(&at("1.vti"), [2, 1, 1], [1.0, 0.0, 0.0], 1.0, 2.0);
+    write_box(&at("0.vti"), [1, 1, 1], [0.0; 3], 1.0, 1.0);
+    write_box(&at("1.vti"), [2, 1, 1], [1.0, 0.0, 0.0], 1.0, 2.0);
     let text = "<VTKFile type=\"vtkMultiBlockDataSet\"><vtkMultiBlockDataSet>\
         <Block index=\"0\" name=\"Element Blocks\"><Piece index=\"0\">\
         <DataSet index=\"0\" file=\"0.vti\"/></Piece><Piece index=\"1\"/>\
@@ -121,23 +101,9 @@ fn slices_in_files_of_their_own_are_one_volume() {
     };
     let text = |s: &[i16]| s.iter().map(|x| format!("{x} ")).collect::<String>().into_bytes();
     let expected = Values::I16((0..24).collect());
-    let nrrd = |encoding: &str, file: &str| {
-        format!(
-            "NRRD0004\ntype: short\ndimension: 3\nsizes: 2 3 4\nendian: little\n\
-             encoding: {encoding}\n{file}"
-        )
-    };
-    let mhd = |file: &str| {
-        format!("NDims = 3\nDimSize = 2 3 4\nElementType = MET_SHORT\nElementDataFile = {file}")
-    };
+    let (nrrd, mhd) = (nrrd_of_slices, metaimage_of_slices);
     let list = "LIST\ns.007\ns.008\ns.009\ns.010\n";
     let dir = tempfile::tempdir().unwrap();
-    let write = |slices: &[Vec<u8>], before: &[u8]| {
-        for (i, slice) in slices.iter().enumerate() {
-            let bytes = [before, slice].concat();
-            std::fs::write(dir.path().join(format!("s.{:03}", i + 7)), bytes).unwrap();
-        }
-    };
     for (name, header, slices, before) in [
         ("a.nhdr", nrrd("raw", "data file: s.%03d 7 10 1\n"), slices(raw), &b""[..]),
         ("a.nhdr", nrrd("gzip", "data file: s.%03d 7 10 1 2\n"), slices(gzip), b""),
@@ -146,7 +112,7 @@ fn slices_in_files_of_their_own_are_one_volume() {
         ("a.mhd", mhd("s.%03d 7 10 1\n"), slices(raw), b""),
         ("a.mhd", mhd(list), slices(raw), b""),
     ] {
-        write(&slices, before);
+        write_slices(dir.path(), &slices, before);
         std::fs::write(dir.path().join(name), header).unwrap();
         assert_eq!(values_of(&dir.path().join(name)), expected, "{name}");
     }

@@ -4,6 +4,7 @@
 pub(crate) mod amrex;
 pub(crate) mod ensight;
 pub(crate) mod openfoam;
+pub(crate) mod several;
 pub(crate) mod tables;
 pub(crate) mod tecplot;
 
