@@ -37,7 +37,7 @@ pub(super) struct Form {
 impl Form {
     /// The form of a cell, behind whose faces this lies.
     pub(super) fn of(mesh: &Mesh, corners: &Corners, beyond: &[u32]) -> Form {
-        let points: Corner3s = corners.ids.iter().map(|&i| mesh.point(i as usize)).collect();
+        let points: Places = corners.ids.iter().map(|&i| mesh.point(i as usize)).collect();
         let folded = Cell::new(&points, &corners.shape).is_folded();
         if corners.shape == Shape::Tetra {
             return Form { folded, convex: true };
@@ -49,9 +49,9 @@ impl Form {
         let (mut number, mut convex) = (0, true);
         corners.shape.each_face(|ring| {
             if beyond[number] != NO_FACE {
-                let ring: Corner3s = ring.iter().map(|&i| points[i as usize] - origin).collect();
+                let ring: Places = ring.iter().map(|&i| points[i as usize] - origin).collect();
                 let face = Face::new(&ring, middle, beyond[number], 0);
-                let length = face.normal.length();
+                let length = face.length();
                 let above = |p: &DVec3| (face.normal.dot(*p - origin) - face.offset) / length;
                 let farthest = points.iter().map(above).fold(0.0, f64::max);
                 convex &= face.thickness(ring.iter().copied()).max(farthest) <= PLANE * size;
@@ -63,7 +63,7 @@ impl Form {
 }
 
 /// The corners of a face or cell.
-type Corner3s = SmallVec<[DVec3; 8]>;
+type Places = SmallVec<[DVec3; 8]>;
 
 /// A cell with what lines need of it. Places are relative to its first corner.
 #[derive(Default)]
@@ -239,7 +239,7 @@ impl PreparedCell {
         let at = at - self.origin;
         let margin = 1e-9 * self.size;
         let below = |f: &Face| {
-            let height = (f.normal.dot(at) - f.offset) / f.normal.length();
+            let height = (f.normal.dot(at) - f.offset) / f.length();
             let ring = self.ring(f).iter().map(|&i| self.corners[i as usize]);
             height <= f.thickness(ring) + margin
         };
@@ -323,9 +323,14 @@ impl Face {
         Face { normal, offset, beyond, first, count, clockwise }
     }
 
+    /// The length of the normal; not zero where the face has no area.
+    fn length(&self) -> f64 {
+        self.normal.length().max(f64::MIN_POSITIVE)
+    }
+
     /// Largest distance of a corner from the plane.
     fn thickness(&self, ring: impl Iterator<Item = DVec3>) -> f64 {
         let off = |p: DVec3| (self.normal.dot(p) - self.offset).abs();
-        ring.map(off).fold(0.0, f64::max) / self.normal.length().max(f64::MIN_POSITIVE)
+        ring.map(off).fold(0.0, f64::max) / self.length()
     }
 }
