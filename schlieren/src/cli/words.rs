@@ -3,11 +3,19 @@
 use datasets::cli::{Interrupted, UsageError};
 
 /// Keys of a scene with the options of the same meaning. Longer keys come before their beginnings.
-const OPTIONS: [(&str, &str); 39] = [
+const OPTIONS: [(&str, &str); 47] = [
     ("flow.density_unit_kg_m3", "--density-unit"),
     ("flow.temperature_zero_k", "--temperature-zero"),
     ("flow.pressure_unit_pa", "--pressure-unit"),
     ("flow.pressure_zero_pa", "--pressure-zero"),
+    ("flow.temperature", "--temperature"),
+    ("flow.pressure", "--pressure"),
+    ("flow.density", "--density"),
+    ("flow.n_minus_1", "--n-minus-1"),
+    ("flow.electrons", "--electrons"),
+    ("flow.humidity", "--humidity"),
+    ("flow.co2_ppm", "--co2-ppm"),
+    ("flow.species", "--species"),
     ("flow.length_unit_m", "--length-unit"),
     ("flow.resample_nodes", "--resample"),
     ("flow.resample_samples", "--resample-samples"),
@@ -47,7 +55,8 @@ const OPTIONS: [(&str, &str); 39] = [
 
 /// A sentence of the library in the words of the command line.
 pub(super) fn in_options(text: &str) -> String {
-    let mut text = text.to_owned();
+    // A section of a scene file.
+    let mut text = text.strip_prefix("[flow]: ").unwrap_or(text).to_owned();
     for (key, option) in OPTIONS {
         // Sentences that name both keep the option.
         for both in [
@@ -114,6 +123,10 @@ mod tests {
         assert_eq!(
             in_options("march.skip_rad has no effect; set flow.on_cells (--on-cells)"),
             "--skip has no effect; set --on-cells"
+        );
+        assert_eq!(
+            in_options("[flow]: flow.temperature needs flow.pressure: name its array"),
+            "--temperature needs --pressure: name its array"
         );
         assert_eq!(in_options("film.sizes and my_film.size"), "film.sizes and my_film.size");
         assert_eq!(in_options("give technique.cutoff.open_m"), "give technique.cutoff.open_m");

@@ -232,7 +232,7 @@ impl FlowSpec {
             self.species.iter().map(gas).collect()
         };
         if self.revolve && self.span.is_some() {
-            return Err(wrong("`span` and `revolve` are alternatives; keep one".into()));
+            return Err(wrong("flow.span and flow.revolve are alternatives; keep one".into()));
         }
         let given = [
             ("density", self.density.is_some()),
@@ -244,10 +244,13 @@ impl FlowSpec {
         let named: Vec<&str> = given.iter().filter(|g| g.1).map(|g| g.0).collect();
         let [only] = named[..] else {
             return Err(wrong(match named.len() {
-                0 => "no quantity sets the index; name the array of the density, or \
-                      those of temperature and pressure"
+                0 => "no quantity sets the index; name the array of flow.density, or those of \
+                      flow.temperature and flow.pressure"
                     .into(),
-                _ => format!("{} are alternatives; keep one", named.join(" and ")),
+                _ => {
+                    let keys: Vec<String> = named.iter().map(|n| format!("flow.{n}")).collect();
+                    format!("{} are alternatives; keep one", keys.join(" and "))
+                }
             }));
         };
 
@@ -267,7 +270,7 @@ impl FlowSpec {
         ] {
             if present && !belongs {
                 return Err(wrong(format!(
-                    "`{key}` has no effect with `{only}`; omit one of them"
+                    "flow.{key} has no effect with flow.{only}; omit one of them"
                 )));
             }
         }
@@ -283,8 +286,8 @@ impl FlowSpec {
             "temperature" => {
                 let Some(pressure) = text(&self.pressure) else {
                     return Err(wrong(
-                        "a temperature needs a pressure; name its array, or give one value in Pa \
-                         for the whole field, such as pressure = \"101325\""
+                        "flow.temperature needs flow.pressure: name its array, or give one value \
+                         in Pa for the whole field, such as 101325"
                             .into(),
                     ));
                 };
@@ -379,10 +382,13 @@ mod tests {
     fn alternatives_and_lacks_are_named() {
         for (text, word) in [
             ("", "no quantity sets the index"),
-            ("density = \"rho\"\ntemperature = \"T\"", "density and temperature are alternatives"),
-            ("temperature = \"T\"", "needs a pressure"),
-            ("density = \"rho\"\nhumidity = \"0.5\"", "`humidity` has no effect"),
-            ("n_minus_1 = \"n\"\nspecies = { Y = \"He\" }", "`species` has no effect"),
+            (
+                "density = \"rho\"\ntemperature = \"T\"",
+                "flow.density and flow.temperature are alternatives",
+            ),
+            ("temperature = \"T\"", "flow.temperature needs flow.pressure"),
+            ("density = \"rho\"\nhumidity = \"0.5\"", "flow.humidity has no effect"),
+            ("n_minus_1 = \"n\"\nspecies = { Y = \"He\" }", "flow.species has no effect"),
             ("density = \"rho\"\nspecies = { Y = \"unobtainium\" }", "unobtainium"),
             ("multifield = { fields = {} }", "no array has a weight"),
             ("multifield = { fields = { T = { knots = [[2, 0], [1, 0]] } } }", "multifield `T`"),
