@@ -60,7 +60,7 @@ pub enum Meaning {
     RelativeDensity,
     /// Temperature in K.
     Temperature,
-    /// Temperature in °C, which has to be converted first.
+    /// Temperature in °C, to which 273.15 has to be added.
     TemperatureCelsius,
     /// Pressure in Pa.
     Pressure,
@@ -111,6 +111,8 @@ fn plain_name(name: &str) -> String {
 
 /// Density of air at 15 °C and 1 atm, kg/m³, for densities relative to a free stream.
 const AIR_KG_M3: f64 = 1.225;
+/// Pressure of the standard atmosphere, where a file has none.
+const ATMOSPHERE_PA: f64 = 101_325.0;
 
 /// Describes a file. `file` has what the file does not say itself.
 ///
@@ -262,6 +264,43 @@ fn meaning(array: &Array) -> Option<Meaning> {
     }
 }
 
+/// Temperatures in K of gases that light passes, for their median. Temperatures without a unit are
+/// about 1.
+const GAS_K: [f64; 2] = [100.0, 6000.0];
+
+/// Options for a temperature, and the pressure if there is one.
+fn of_temperature(
+    arrays: &[Array],
+    options: &mut Vec<(&'static str, String)>,
+    notes: &mut Vec<String>,
+) {
+    let find = |meaning| arrays.iter().find(|a| a.meaning == Some(meaning));
+    if let Some(t) = find(Meaning::TemperatureCelsius) {
+        options.push(("--temperature", t.name.clone()));
+        options.push(("--temperature-zero", "273.15".into()));
+        notes.push(format!(
+            "`{}` looks like a temperature in C: the command adds 273.15 for K",
+            t.name
+        ));
+    } else if let Some(t) = find(Meaning::Temperature)
+        && t.values.is_some_and(|[_, median, _]| (GAS_K[0]..GAS_K[1]).contains(&median))
+    {
+        options.push(("--temperature", t.name.clone()));
+    } else {
+        return;
+    }
+    if let Some(p) = find(Meaning::Pressure) {
+        options.push(("--pressure", p.name.clone()));
+        return;
+    }
+    options.push(("--pressure", ATMOSPHERE_PA.to_string()));
+    notes.push(format!(
+        "no array is recognised as a pressure in Pa: the command takes {ATMOSPHERE_PA} everywhere; \
+         --pressure NAME takes an array, with --pressure-unit and --pressure-zero where it is in \
+         another unit or relative to the atmosphere"
+    ));
+}
+
 /// Options for the arrays that were recognised.
 fn guess(c: &mut Contents, axisymmetric: bool) -> Option<Guess> {
     let size = c.size?;
@@ -284,9 +323,8 @@ fn guess(c: &mut Contents, axisymmetric: bool) -> Option<Guess> {
         ));
     } else if let Some(a) = find(Meaning::Electrons) {
         options.push(("--electrons", name(a)));
-    }
-    if let Some(a) = find(Meaning::TemperatureCelsius) {
-        notes.push(format!("`{}` looks like a temperature in C; --temperature takes K", a.name));
+    } else {
+        of_temperature(&c.arrays, &mut options, &mut notes);
     }
     if options.is_empty() {
         notes.push(
@@ -392,10 +430,26 @@ mod tests {
     #[test]
     fn celsius_gauge_pressure_and_relative_density_are_not_taken_as_they_are() {
         let c = image([5; 3], 0.01, &[("T", [-5.0, 20.0, 60.0]), ("p", [-3.0, 0.0, 5.0])]);
-        assert!(c.guess.is_none());
+        let expected = [
+            ("--temperature", "T".to_owned()),
+            ("--temperature-zero", "273.15".into()),
+            ("--pressure", "101325".into()),
+        ];
+        assert_eq!(options(&c), expected);
         assert!(c.notes[0].contains("`T` looks like a temperature in C"), "{:?}", c.notes);
+        assert!(c.notes[1].contains("no array is recognised as a pressure"), "{:?}", c.notes);
         let c = image([5; 3], 0.01, &[("rho", [0.4, 1.0, 3.0])]);
         assert_eq!(options(&c)[1], ("--density-unit", "1.225".into()));
+    }
+
+    #[test]
+    fn a_temperature_alone_is_at_one_atmosphere_and_one_without_a_unit_is_none() {
+        let c =
+            image([5; 3], 0.01, &[("Temp", [293.0, 400.0, 913.0]), ("Pres", [0.0, 0.02, 0.03])]);
+        let expected = [("--temperature", "Temp".to_owned()), ("--pressure", "101325".into())];
+        assert_eq!(options(&c), expected);
+        let c = image([5; 3], 0.01, &[("T", [0.8, 1.0, 1.3])]);
+        assert!(c.guess.is_none(), "{c:?}");
     }
 
     #[test]
