@@ -103,7 +103,7 @@ fn the_arrays_of_the_index_are_chosen_on_the_page() {
         (json!({"density": null}), "give the name of an array"),
         (json!({"density": "rho", "n_minus_1": "T"}), "density and n_minus_1 are alternatives"),
         (json!({"density": "rho", "multifield": {"fields": {}}}), "alternatives"),
-        (json!({"pressure": "101325"}), "`pressure` has no effect"),
+        (json!({"pressure": "101325"}), "flow.pressure has no effect"),
         (json!({"viscosity": "mu"}), "only `multifield`"),
     ] {
         let text = refusal(&s, &json!({ "flow": wrong }));

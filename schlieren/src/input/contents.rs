@@ -254,6 +254,8 @@ fn meaning(array: &Array) -> Option<Meaning> {
     match by_name {
         Meaning::Density if (median - 1.0).abs() < 2e-3 => Some(Meaning::RelativeDensity),
         Meaning::Density => (low > 0.0 && high < 1e3).then_some(by_name),
+        // By that of the free stream, or of the wall.
+        Meaning::Temperature if low > 0.0 && high < WITHOUT_UNIT => None,
         Meaning::Temperature if median < 75.0 && low > -80.0 && high < 200.0 => {
             Some(Meaning::TemperatureCelsius)
         }
@@ -264,9 +266,11 @@ fn meaning(array: &Array) -> Option<Meaning> {
     }
 }
 
-/// Temperatures in K of gases that light passes, for their median. Temperatures without a unit are
-/// about 1.
-const GAS_K: [f64; 2] = [100.0, 6000.0];
+/// Temperatures in K of gases that light passes, for their median.
+const GAS_K: [f64; 2] = [75.0, 20_000.0];
+/// Temperatures between zero and this are those of no gas in K, and in °C of none that changes
+/// much: they are parts of a temperature.
+const WITHOUT_UNIT: f64 = 12.0;
 
 /// Options for a temperature, and the pressure if there is one.
 fn of_temperature(

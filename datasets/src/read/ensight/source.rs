@@ -165,8 +165,8 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// Passes numbers that nobody needs. They tell nothing of the byte order: the first whole number
-    /// does.
+    /// Passes numbers that nobody needs. They tell nothing of the byte order: the first whole
+    /// number does.
     pub(super) fn skip_reals(&mut self, count: u64, what: &str) -> Result<(), Fault> {
         if self.binary {
             return self.cursor.take(count, 4, what).map(drop);
