@@ -25,7 +25,7 @@ pub(super) struct FlowArgs {
     /// Added to the temperature: 273.15 when it is in C
     #[arg(long, value_name = "KELVIN", allow_hyphen_values = true)]
     temperature_zero: Option<f64>,
-    /// Array with the pressure in Pa
+    /// Array with the pressure in Pa, or one value for the whole field
     #[arg(long, value_name = "NAME")]
     pressure: Option<String>,
     /// Pa per unit of the pressure array
