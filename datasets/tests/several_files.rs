@@ -62,6 +62,29 @@ fn cells_that_a_finer_level_covers_are_marked_in_every_version() {
 }
 
 #[test]
+fn boxes_without_numbers_are_told_and_nothing_is_marked() {
+    let dir = tempfile::tempdir().unwrap();
+    write_boxes(dir.path());
+    let path = dir.path().join("a.vthb");
+    let warnings = |kind: &str| {
+        let text = levels(kind, "1.1", "").replace("amr_box", "of_another");
+        std::fs::write(&path, text).unwrap();
+        let file = open(&path).unwrap_or_else(|e| panic!("{e}"));
+        let warnings = file.warnings.join("\n");
+        assert!(blocks(file).iter().all(|b| refined(&b.1).is_empty()));
+        warnings
+    };
+    let overlapping = warnings("vtkOverlappingAMR");
+    assert!(overlapping.contains("3 of 3 boxes are without an amr_box"), "{overlapping}");
+    assert!(!overlapping.contains("covers"), "{overlapping}");
+    assert_eq!(warnings("vtkNonOverlappingAMR"), "");
+    let kind = "vtkOverlappingAMR";
+    std::fs::write(&path, format!("<VTKFile type=\"{kind}\"><{kind}/></VTKFile>")).unwrap();
+    let error = open(&path).map(|_| ()).unwrap_err().to_string();
+    assert!(error.contains("they name no files"), "{error}");
+}
+
+#[test]
 fn a_piece_that_holds_files_is_not_empty() {
     let dir = tempfile::tempdir().unwrap();
     let at = |name: &str| dir.path().join(name);

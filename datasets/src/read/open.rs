@@ -12,13 +12,14 @@ use std::io::Read;
 use std::path::Path;
 
 /// The supported formats, for messages.
-pub const KNOWN: &str = "VTK XML (.vti .vtp .vtu .vtr .vts, their parallel forms, .pvd, .vtm, .vthb, .series), VTK \
-                         legacy (.vtk), VTKHDF (.vtkhdf), NetCDF (.nc), Exodus II (.e .exo), \
-                         XDMF (.xdmf .xmf), CGNS (.cgns), \
+pub const KNOWN: &str = "VTK XML (.vti .vtp .vtu .vtr .vts, their parallel forms, .pvd, .vtm, \
+                         .vthb, .series), VTK legacy (.vtk), VTKHDF (.vtkhdf), NetCDF (.nc), \
+                         Exodus II (.e .exo), XDMF (.xdmf .xmf), CGNS (.cgns), \
                          PLOT3D (.xyz .x .g .q .bin), NRRD (.nrrd .nhdr), MetaImage (.mhd .mha), \
                          raw with TOML (.raw), NumPy (.npy .npz), OpenFOAM cases (folders, .foam), \
                          Tecplot (.dat .tec .plt), EnSight Gold (.case), \
-                         AMReX plotfiles (folders), tables of points (.csv .tsv .txt), OBJ, glTF, PLY, STL";
+                         AMReX plotfiles (folders), tables of points (.csv .tsv .txt), OBJ, \
+                         glTF, PLY, STL";
 
 /// Number of bytes examined.
 const HEAD_BYTES: u64 = 1024;

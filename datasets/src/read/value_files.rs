@@ -36,7 +36,7 @@ pub(super) fn names(field: &str, rest: &[u8]) -> Result<Option<Vec<String>>, Fau
         return Ok(None);
     };
     let Some(pattern) = Pattern::new(pattern) else { return Ok(None) };
-    let apart = last.checked_sub(first).filter(|_| step != 0).map(|d| d / step);
+    let apart = last.checked_sub(first).and_then(|d| d.checked_div(step));
     match apart.filter(|n| (0..MOST_FILES).contains(n)) {
         Some(n) => Ok(Some((0..=n).map(|i| pattern.name(first + i * step)).collect())),
         None => Err(wrong(format!("{first} to {last} in steps of {step}"))),
@@ -130,7 +130,8 @@ mod tests {
         {
             assert!(names(one, b"").unwrap().is_none(), "{one}");
         }
-        for wrong in ["s%d 1 9 0", "s%d 9 1 1", "s%d 0 99999999 1", "LIST"] {
+        const LEAST: &str = "s%d 1 -9223372036854775807 -1";
+        for wrong in ["s%d 1 9 0", "s%d 9 1 1", "s%d 0 99999999 1", "LIST", LEAST] {
             assert!(names(wrong, b" \n").is_err(), "{wrong}");
         }
         assert_eq!(

@@ -15,12 +15,9 @@ use roxmltree::Node;
 use std::path::Path;
 
 /// Names of such data sets, from the newest on.
-pub(super) const KINDS: [&str; 4] = [
-    "vtkOverlappingAMR",
-    "vtkNonOverlappingAMR",
-    "vtkHierarchicalBoxDataSet",
-    "vtkHierarchicalDataSet",
-];
+pub(super) const KINDS: [&str; 4] =
+    ["vtkOverlappingAMR", NOT_OVERLAPPING, "vtkHierarchicalBoxDataSet", "vtkHierarchicalDataSet"];
+const NOT_OVERLAPPING: &str = "vtkNonOverlappingAMR";
 /// Levels, at most; each halves the cells at least.
 const MOST_LEVELS: usize = 64;
 
@@ -58,7 +55,13 @@ pub(super) fn read(
         }
     }
     boxes.sort_by_key(|b| b.level);
-    let levels = boxes.last().map_or(0, |b| b.level + 1);
+    let Some(levels) = boxes.last().map(|b| b.level + 1) else {
+        return Err(fault(Fault::new(
+            At::Field("the levels".into()),
+            "they name no files",
+            BROKEN,
+        )));
+    };
     for level in 1..levels {
         let finer = boxes.iter().filter(|b| b.level == level);
         let Some(ratio) = ratio(&boxes, level).map_err(fault)? else { continue };
@@ -69,9 +72,18 @@ pub(super) fn read(
             }
         }
     }
-    if levels > 1 {
+    // Boxes that do not overlap have no numbers.
+    let unknown = boxes.iter().filter(|b| b.cells.is_none()).count();
+    if levels > 1 && unknown < boxes.len() {
         warnings.push(format!(
             "{levels} levels: cells that a finer level covers are marked as refined"
+        ));
+    }
+    if levels > 1 && unknown > 0 && set.tag_name().name() != NOT_OVERLAPPING {
+        warnings.push(format!(
+            "{unknown} of {} boxes are without an amr_box or no image data: where they overlap \
+             those of other levels, nothing is marked as refined",
+            boxes.len()
         ));
     }
     let blocks = boxes.into_iter().map(|b| Block { name: b.name, data: b.data });
@@ -138,11 +150,15 @@ fn fitted(mut cells: IndexBox, image: &ImageData) -> Option<IndexBox> {
 }
 
 /// How many cells of a level are along an axis of one cell of the level before it. `None` where one
-/// of them has no boxes.
+/// of them has no boxes with numbers.
 fn ratio(boxes: &[LevelBox], level: usize) -> Result<Option<i64>, Fault> {
     let spacing = |level: usize| {
         boxes.iter().filter(|b| b.level == level).find_map(|b| match (&b.cells, &b.data) {
-            (Some(_), Dataset::ImageData(image)) => Some(image.spacing.x),
+            // An axis that the data do not have has any spacing.
+            (Some(_), Dataset::ImageData(image)) => {
+                let dims = extent_dims(image.extent);
+                (0..3).find(|&a| dims[a] > 1).map(|a| image.spacing[a])
+            }
             _ => None,
         })
     };
