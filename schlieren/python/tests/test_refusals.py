@@ -49,7 +49,7 @@ PLACE = {"spacing": 0.01}
             ValueError,
             ["pressure_unit", "leave one out"],
         ),
-        ({"temperature": DENSITY * 300}, ValueError, ["temperature needs a pressure"]),
+        ({"temperature": DENSITY * 300}, ValueError, ["temperature needs pressure: an array"]),
         ({"density": DENSITY, "temperature": DENSITY}, ValueError, ["alternatives"]),
         ({"density": DENSITY, "humidity": 0.5}, ValueError, ["humidity", "no effect"]),
         (
