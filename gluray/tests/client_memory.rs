@@ -16,11 +16,21 @@ mod capture {
         }
         pub(crate) fn component_bytes(_: u32) -> usize { 4 }
     }
-    pub(crate) mod vertex_arrays {
+    pub(crate) mod vertex_selection {
         pub(crate) enum VertexSelection { Range { first: usize, count: usize } }
+        pub(crate) fn decode_indices(
+            _: &[u8], _: usize, _: i32, _: Option<u32>,
+        ) -> impl Iterator<Item = u32> {
+            std::iter::empty()
+        }
         impl VertexSelection {
             pub(crate) fn indexed(
-                _: &[u8], _: usize, _: i32, _: Option<u32>,
+                _: Vec<u32>, _: bool,
+            ) -> Result<VertexSelection, &'static str> {
+                Err("none")
+            }
+            pub(crate) fn several(
+                _: Vec<u32>, _: Vec<usize>, _: bool, _: bool,
             ) -> Result<VertexSelection, &'static str> {
                 Err("none")
             }

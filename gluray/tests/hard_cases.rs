@@ -145,6 +145,18 @@ fn check_all(cases: &[&str]) {
 }
 
 #[test]
+fn several_draws_in_one_call_are_traced_as_one_by_one() {
+    check_all(&[
+        "several_ranges",
+        "several_clipped_quads",
+        "several_lists_of_indices",
+        "several_ranges_in_a_list",
+        "several_lists_of_indices_in_a_list",
+        "several_draws_that_are_refused",
+    ]);
+}
+
+#[test]
 fn mipmaps_are_the_drivers() {
     check_all(&["mipmaps", "levels_and_limits_of_textures", "generated_mipmaps"]);
 }

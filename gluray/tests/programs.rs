@@ -341,6 +341,8 @@ fn share_of_scene(kind: &[&str]) -> Share {
         ["translucent_moved_back"] => share(0.61, 0.9),
         // VTK's own passes over the whole image are not traced.
         ["peeled"] => share(0.42, 0.99),
+        ["peeled_glyphs"] => share(0.37, 0.99),
+        ["translucent_glyphs"] => share(0.75, 0.99),
         ["translucent"] => share(0.85, 0.99),
         ["translucent_pictures"] => share(0.83, 0.99),
         [_, "4"] => share(0.8, 3.9),
@@ -410,6 +412,18 @@ fn clipping_planes_of_mappers_cut_where_the_driver_cuts() {
 #[test]
 fn lamps_spots_and_light_kits_are_the_drivers() {
     scenes(&[&["lights"], &["light_kit"]], true, 4);
+}
+
+#[test]
+fn glyphs_of_todays_vtk_are_the_drivers() {
+    scenes(&[&["glyphs"]], true, 4);
+    scenes(&[&["glyphs", "4"], &["lit_glyphs"], &["two_sided_glyphs"]], false, 4);
+}
+
+#[test]
+fn translucent_glyphs_are_the_drivers() {
+    scenes(&[&["translucent_glyphs"]], true, 3);
+    scenes(&[&["peeled_glyphs"]], false, 3).iter().for_each(assert_peeled);
 }
 
 #[test]

@@ -36,11 +36,14 @@ impl BufferWrites {
         self.named.insert(buffer, self.count);
     }
 
-    /// The numbers of the last writes to the buffers of arrays and indices.
-    pub(crate) fn last(&self, arrays: &[Option<ArraySource>; 7], indices: u32) -> [u64; 8] {
-        let of = |buffer: u32| self.named.get(&buffer).copied().unwrap_or(self.unnamed);
-        let array = |i: usize| arrays[i].map_or(0, |s| of(s.buffer));
-        [array(0), array(1), array(2), array(3), array(4), array(5), array(6), of(indices)]
+    /// The numbers of the last writes to the buffers of arrays.
+    pub(crate) fn last<const N: usize>(&self, arrays: &[Option<ArraySource>; N]) -> [u64; N] {
+        arrays.map(|a| a.map_or(0, |s| self.last_to(s.buffer)))
+    }
+
+    /// The number of the last write to a buffer.
+    pub(crate) fn last_to(&self, buffer: u32) -> u64 {
+        self.named.get(&buffer).copied().unwrap_or(self.unnamed)
     }
 }
 
@@ -94,15 +97,16 @@ mod tests {
                 normalized: false,
             })
         };
-        let arrays = [source(5), source(6), None, None, None, None, None];
+        let arrays = [source(5), source(6), None];
         let mut w = BufferWrites::default();
-        let before = w.last(&arrays, 7);
+        let before = w.last(&arrays);
         w.to(8);
-        assert_eq!(w.last(&arrays, 7), before);
-        w.to(7);
-        let after = w.last(&arrays, 7);
+        assert_eq!(w.last(&arrays), before);
+        w.to(6);
+        let after = w.last(&arrays);
         assert_ne!(after, before);
         w.any();
-        assert!(w.last(&arrays, 7).iter().zip(after).all(|(a, b)| *a == 0 || *a > b));
+        assert!(w.last(&arrays).iter().zip(after).all(|(a, b)| *a == 0 || *a > b));
+        assert_eq!(w.last_to(9), w.last_to(6));
     }
 }

@@ -14,6 +14,7 @@ pub(crate) mod primitives;
 mod textures;
 pub(crate) mod vertex_arrays;
 pub(crate) mod vertex_recorder;
+pub(crate) mod vertex_selection;
 
 use attribute_cache::AttributeCache;
 use display_lists::ListRecording;

@@ -6,7 +6,7 @@
 use crate::capture::ImmediateModeTarget;
 use crate::capture::draw::{Attributes, Draw, PackedArray, Shading, Values, component_bytes};
 use crate::capture::geometry_cache::hash;
-use crate::capture::primitives::{QuadSplit, is_filled, triangulate};
+use crate::capture::primitives::is_filled;
 use crate::classify::rules::Classification;
 use crate::classify::vtk::DrawCall;
 use crate::driver::gl;
@@ -17,7 +17,6 @@ use crate::interpose::client_memory::{
 use crate::interpose::context::Context;
 use crate::interpose::flush_reason::FlushReason;
 use crate::interpose::kept_errors::KeptErrors;
-use crate::state::snapshot::Snapshot;
 use crate::trace::overrides::RayMaterial;
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -126,172 +125,6 @@ pub(crate) enum ArrayDrawOutcome {
     Shape,
 }
 
-/// The vertices of a draw.
-pub(crate) enum VertexSelection {
-    /// Consecutive vertices of the arrays.
-    Range { first: usize, count: usize },
-    /// Vertices by index. `least` is the smallest index, `count` the span.
-    Indexed { indices: Vec<u32>, least: usize, count: usize },
-}
-
-impl VertexSelection {
-    /// The index at which a primitive ends and another one begins.
-    const RESTART: u32 = u32::MAX;
-
-    /// Decodes indices of `width` bytes each, with the index that restarts primitives.
-    pub(crate) fn indexed(
-        bytes: &[u8],
-        width: usize,
-        base: i32,
-        restart: Option<u32>,
-    ) -> Result<VertexSelection, &'static str> {
-        let decode = |b: &[u8]| match *b {
-            [a] => u32::from(a),
-            [a, b] => u32::from(u16::from_ne_bytes([a, b])),
-            [a, b, c, d] => u32::from_ne_bytes([a, b, c, d]),
-            _ => 0,
-        };
-        let place = |raw: u32| match restart {
-            Some(r) if r == raw => VertexSelection::RESTART,
-            _ => raw.wrapping_add_signed(base),
-        };
-        let indices: Vec<u32> = bytes.chunks_exact(width).map(|b| place(decode(b))).collect();
-        let real =
-            || indices.iter().filter(|i| restart.is_none() || **i != VertexSelection::RESTART);
-        let (Some(&least), Some(&most)) = (real().min(), real().max()) else {
-            return Ok(VertexSelection::Indexed { indices, least: 0, count: 0 });
-        };
-        let count = (most - least) as usize + 1;
-        // The length of client arrays is unknown: a wrong index must not make us read gigabytes.
-        if count > 1 << 28 {
-            return Err("indices that are too far apart");
-        }
-        Ok(VertexSelection::Indexed { indices, least: least as usize, count })
-    }
-
-    /// The key of the geometry of these elements of an array of positions, whose bytes are given.
-    fn key(
-        &self,
-        mode: u32,
-        bytes: &[u8],
-        layout: (usize, u32, usize, bool),
-        split: &QuadSplit,
-    ) -> u128 {
-        let (stride, kind, size, _) = layout;
-        let rules = u64::from(split.first_provokes) << 1 | u64::from(split.all_turned);
-        let (_, count) = self.span();
-        let tail =
-            [stride as u64, u64::from(kind), size as u64, u64::from(mode), rules, count as u64];
-        let tail = bytemuck::cast_slice(&tail);
-        match self {
-            VertexSelection::Range { .. } => {
-                hash(&[bytes, tail, bytemuck::cast_slice(&split.turned)])
-            }
-            VertexSelection::Indexed { indices, least, .. } => {
-                hash(&[bytes, bytemuck::cast_slice(indices), &least.to_ne_bytes(), tail])
-            }
-        }
-    }
-
-    /// The first vertex, and the number of vertices from it on.
-    pub(crate) fn span(&self) -> (usize, usize) {
-        match self {
-            VertexSelection::Range { first, count } => (*first, *count),
-            VertexSelection::Indexed { least, count, .. } => (*least, *count),
-        }
-    }
-
-    /// Up to `most` different vertices, spread over the draw.
-    pub(crate) fn some(&self, most: usize) -> Vec<u32> {
-        let n = match self {
-            VertexSelection::Range { count, .. } => *count,
-            VertexSelection::Indexed { indices, .. } => indices.len(),
-        };
-        let take = most.min(n);
-        let number = |i: usize| match self {
-            VertexSelection::Range { first, .. } => (first + i) as u32,
-            VertexSelection::Indexed { indices, .. } => indices[i],
-        };
-        let mut out: Vec<u32> =
-            (0..take).map(|i| number(i * (n - 1) / (take - 1).max(1))).collect();
-        out.sort_unstable();
-        out.dedup();
-        out
-    }
-
-    /// How the driver splits quads when it is unknown what it clips.
-    pub(crate) fn plain_split(&self, first_provokes: bool) -> QuadSplit {
-        QuadSplit {
-            first_provokes,
-            all_turned: matches!(self, VertexSelection::Indexed { .. }),
-            turned: Vec::new(),
-        }
-    }
-
-    /// How the driver splits quads: see [`QuadSplit`].
-    pub(crate) fn split(
-        &self,
-        mode: u32,
-        s: &Snapshot,
-        position: &ArraySource,
-        bytes: &[u8],
-    ) -> QuadSplit {
-        let mut split = self.plain_split(s.first_vertex_provokes);
-        split.all_turned |= s.turns_quads();
-        let (_, count) = self.span();
-        if mode == QUADS && !split.all_turned {
-            let clipped = s.clips();
-            let (step, one, size) =
-                (position.step(), component_bytes(position.kind), position.size.min(3));
-            split.find_clipped_quads(0, count as u32, |from, to| {
-                (from..to).any(|i| {
-                    let at = i as usize * step;
-                    let mut p = [0.0; 3];
-                    for (k, v) in p.iter_mut().enumerate().take(size) {
-                        let b = bytes.get(at + k * one..at + (k + 1) * one);
-                        *v = b.map_or(0.0, |b| {
-                            crate::capture::draw::component(b, position.kind, false)
-                        });
-                    }
-                    clipped(p)
-                })
-            });
-        }
-        split
-    }
-
-    /// The triangles, as vertex numbers of the span.
-    pub(crate) fn triangles(&self, mode: u32, split: &QuadSplit) -> Vec<[u32; 3]> {
-        let mut out = Vec::new();
-        match self {
-            VertexSelection::Range { count, .. } => {
-                triangulate(mode, 0, *count as u32, split, &mut out)
-            }
-            VertexSelection::Indexed { indices, least, .. } => {
-                triangulate(mode, 0, indices.len() as u32, split, &mut out);
-                let vertex = |i: u32| indices[i as usize] - *least as u32;
-                out.iter_mut().for_each(|t| *t = t.map(vertex));
-            }
-        }
-        out
-    }
-
-    /// The vertex numbers of the span in drawing order. `None` separates primitives.
-    fn order(&self) -> Box<dyn Iterator<Item = Option<usize>> + '_> {
-        match self {
-            VertexSelection::Range { count, .. } => Box::new((0..*count).map(Some)),
-            VertexSelection::Indexed { indices, least, .. } => {
-                let place = move |i: &u32| (*i as usize).checked_sub(*least);
-                Box::new(
-                    indices
-                        .iter()
-                        .map(move |i| place(i).filter(|_| *i != VertexSelection::RESTART)),
-                )
-            }
-        }
-    }
-}
-
 /// Positions as x, y, z. Points with w > 0 are divided by it.
 pub(crate) fn positions(p: &PackedArray) -> Result<Vec<[f32; 3]>, &'static str> {
     if p.kind == FLOAT && p.size == 3 {
@@ -310,14 +143,49 @@ pub(crate) fn positions(p: &PackedArray) -> Result<Vec<[f32; 3]>, &'static str> 
         .collect()
 }
 
+/// The copies that an instanced draw call makes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) struct Instances {
+    pub(crate) count: usize,
+    /// The element of the first one in arrays with a divisor.
+    pub(crate) first: usize,
+}
+
+impl Instances {
+    /// As in a call. A negative number, which OpenGL refuses, is none.
+    pub(crate) fn of(count: i32, first: u32) -> Instances {
+        Instances { count: usize::try_from(count).unwrap_or(0), first: first as usize }
+    }
+}
+
 impl Context {
     /// A draw call of arrays, in order or by indices.
     pub(crate) fn draw(&mut self, mode: u32, call: &ActiveCall<'_>) -> bool {
+        self.draw_elements(mode, call, None)
+    }
+
+    /// An instanced draw call.
+    pub(crate) fn draw_instances(
+        &mut self,
+        mode: u32,
+        call: &ActiveCall<'_>,
+        instances: Instances,
+    ) -> bool {
+        self.draw_elements(mode, call, Some(instances))
+    }
+
+    fn draw_elements(
+        &mut self,
+        mode: u32,
+        call: &ActiveCall<'_>,
+        instances: Option<Instances>,
+    ) -> bool {
         let (key, restart) = match call.named() {
             DrawArguments::Elements { count, kind, at, base } => {
                 let buffer = gl::word(ELEMENT_ARRAY_BUFFER_BINDING) as usize;
                 let first = (buffer << 32) | base as u32 as usize;
-                let key = DrawCall { first, count: count.max(0) as usize, kind, at };
+                let count = count.max(0) as usize;
+                let key = DrawCall { first, count, kind, at, draws: 1, instances };
                 (
                     key,
                     if self.capture.immediate_target == ImmediateModeTarget::List {
@@ -329,11 +197,34 @@ impl Context {
             }
             DrawArguments::Arrays { first, count } => {
                 let (first, count) = (first.max(0) as usize, count.max(0) as usize);
-                (DrawCall { first, count, kind: 0, at: 0 }, None)
+                (DrawCall { first, count, kind: 0, at: 0, draws: 1, instances }, None)
+            }
+            DrawArguments::SeveralArrays { .. } | DrawArguments::SeveralElements { .. } => {
+                self.several_draws(call)
             }
             DrawArguments::Element(_) => return false,
         };
         self.array_draw(mode, key, || Elements::of(call, restart))
+    }
+
+    /// The key of several draws in one call, and the index that restarts primitives.
+    fn several_draws(&self, call: &ActiveCall<'_>) -> (DrawCall, Option<u32>) {
+        // What OpenGL refuses is refused when the elements are read.
+        let draws = call.several().unwrap_or_default();
+        let list = self.capture.immediate_target == ImmediateModeTarget::List;
+        let (kind, restart, buffer) = match call.named() {
+            DrawArguments::SeveralElements { kind, .. } => {
+                let restart = if list { self.restart_index(kind) } else { None };
+                (kind, restart, gl::word(ELEMENT_ARRAY_BUFFER_BINDING) as usize)
+            }
+            _ => (0, None, 0),
+        };
+        let words: Vec<u64> =
+            draws.iter().flat_map(|d| [d.at as u64, d.count as u64, d.base as u64]).collect();
+        let digest = hash(&[bytemuck::cast_slice(&words)]);
+        let count = draws.iter().fold(0_usize, |n, d| n.saturating_add(d.count));
+        let (first, at) = (buffer << 32 | (digest >> 96) as usize, digest as usize);
+        (DrawCall { first, count, kind, at, draws: draws.len(), instances: None }, restart)
     }
 
     fn array_draw<'c>(
@@ -347,12 +238,17 @@ impl Context {
             return false;
         }
         if self.capture.immediate_target == ImmediateModeTarget::List {
+            if call.instances.is_some() {
+                self.capture.list_driver_call(false, true);
+                return false;
+            }
             return self.array_into_list(mode, elements);
         }
         if self.capture.immediate_target == ImmediateModeTarget::Pass {
             return false;
         }
-        if self.passes_draw(mode, u32::try_from(call.count).unwrap_or(u32::MAX)) {
+        let vertices = call.instances.map_or(1, |i| i.count).saturating_mul(call.count);
+        if self.passes_draw(mode, u32::try_from(vertices).unwrap_or(u32::MAX)) {
             return false;
         }
         let classification = self.classify_draw();
@@ -363,6 +259,7 @@ impl Context {
             // Recognised programs have their own rules for blending.
             _ if self.state.snapshot.program != 0 => self.take_program_arrays(mode, call, elements),
             Classification::Pass(why) => Err(why),
+            _ if call.instances.is_some() => Err("instances without a program"),
             v => self.take_arrays(mode, elements, v).map(|()| ArrayDrawOutcome::Traced),
         };
         KeptErrors::drop_ours();

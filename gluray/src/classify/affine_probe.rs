@@ -183,10 +183,10 @@ impl Context {
             return Err("positions that are not finite");
         }
         for source in sources {
-            let written = self
-                .shared
-                .writes()
-                .last(&[Some(source), None, None, None, None, None, None], indices);
+            let written = {
+                let writes = self.shared.writes();
+                (writes.last_to(source.buffer), writes.last_to(indices))
+            };
             let key = hash(&[
                 format!("{source:?} {mode} {call:?} {first} {count} {written:?}").as_bytes()
             ]);

@@ -13,6 +13,7 @@ mod codec;
 mod color;
 mod depth_peeling;
 mod glsl;
+mod glyphs;
 mod program;
 mod shadow_maps;
 mod signature;
@@ -20,7 +21,7 @@ mod weighted_blending;
 
 use crate::capture::draw::{Attributes, Draw, Shading, Values};
 use crate::capture::geometry_cache::Geometry;
-use crate::capture::vertex_arrays::{ArrayDrawOutcome, positions};
+use crate::capture::vertex_arrays::{ArrayDrawOutcome, Instances, positions};
 use crate::classify::rules::{self, Classification, TraceFilter};
 use crate::driver::gl;
 use crate::enums::*;
@@ -35,6 +36,7 @@ use crate::trace::overrides::{self, RayMaterial};
 use crate::trace::texturing::Image;
 pub(crate) use color::FragmentSample;
 use depth_peeling::DepthPeeling;
+use glyphs::GlyphArrays;
 use program::CellData;
 pub(crate) use program::{ProgramColorSource, ProgramLight, VtkProgram};
 use shadow_maps::ShadowMaps;
@@ -52,11 +54,13 @@ pub(crate) fn recognise(vertex: &str, geometry: &str, fragment: &str) -> Result<
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 struct DrawCacheKey {
     sources: Sources,
-    elements: (u32, usize, usize, u32, usize),
+    glyphs: Option<GlyphArrays>,
+    mode: u32,
+    call: DrawCall,
     /// The number of the first triangle in buffer textures.
     first: i32,
     /// The numbers of their last writes.
-    written: [u64; 8],
+    written: ([u64; 7], [u64; 3], u64),
 }
 
 /// Positions, normals, colours, texture coordinates; colours and edges of cells; coordinates of the
@@ -171,12 +175,26 @@ impl Context {
             && self.config.settings.mode == Mode::Enhance
             && self.config.settings.enabled
         {
+            if call.instances.is_some() || call.draws != 1 {
+                // Its shader may ask which copy or draw it is in.
+                return Err("instances or several draws of a program that is not recognised");
+            }
             return self.take_shape(mode, call, elements).map(|()| ArrayDrawOutcome::Shape);
         }
         if !matches!(signature, Ok(t) if t.peel != TranslucencyPass::No) {
             self.classifier.programs.is_drawn_once(&signature)?;
         }
         let signature = signature?;
+        let numbers_cells = signature.colors == ColorSource::PerCell || signature.edges;
+        if call.draws != 1 && numbers_cells {
+            return Err("several draws in one call, with data of cells");
+        }
+        match (signature.glyphs, call.instances) {
+            (true, Some(Instances { count: 1.., .. })) | (false, None) => {}
+            (true, Some(_)) => return Err("no instances"),
+            (true, None) => return Err("glyphs of VTK's without instances"),
+            (false, Some(_)) => return Err("instances of a surface of VTK's"),
+        }
         match signature.peel {
             TranslucencyPass::Weighted => weighted_blending::check_pass(
                 &self.state.snapshot,
@@ -204,7 +222,10 @@ impl Context {
             cells(signature.edges, "edgeTexture")?,
             attribute(program, "tcoord").filter(|_| signature.two_coordinates),
         ];
-        if sources.iter().flatten().any(|s| s.buffer == 0) {
+        let glyphs =
+            signature.glyphs.then(|| GlyphArrays::query(program, &signature)).transpose()?;
+        let of_glyphs = glyphs.map_or([None; 3], |g| g.buffers());
+        if sources.iter().chain(&of_glyphs).flatten().any(|s| s.buffer == 0) {
             return Err("a program with arrays in client memory");
         }
         let map = match signature.colors {
@@ -224,9 +245,16 @@ impl Context {
         };
         let key = DrawCacheKey {
             sources,
-            elements: (mode, call.first, call.count, call.kind, call.at),
+            glyphs,
+            mode,
+            call,
             first,
-            written: self.shared.writes().last(&sources, (call.first >> 32) as u32),
+            written: {
+                let writes = self.shared.writes();
+                let of_glyphs = glyphs.map_or([None; 3], |g| g.buffers());
+                let of_indices = writes.last_to((call.first >> 32) as u32);
+                (writes.last(&sources), writes.last(&of_glyphs), of_indices)
+            },
         };
         let now = self.classifier.programs.frame;
         let known = self.classifier.programs.made.get_mut(&key).map(|m| {
@@ -236,10 +264,15 @@ impl Context {
         let (geometry, attributes, cells) = match known {
             Some(known) => known,
             None => {
-                let (geometry, attributes) = self.read_program_arrays(mode, &sources, elements)?;
-                let cells = read_cells(&sources, first, geometry.mesh.num_triangles())?;
+                let copies = glyphs.zip(call.instances);
+                let (geometry, attributes) =
+                    self.read_program_arrays(mode, &sources, copies, elements)?;
+                let copies = call.instances.map_or(1, |i| i.count);
+                let triangles = geometry.mesh.num_triangles() / copies;
+                let cells = read_cells(&sources, first, triangles)?.repeated(copies);
                 let same = |k: &DrawCacheKey| {
-                    (&k.sources, k.elements, k.first) == (&key.sources, key.elements, first)
+                    (&k.sources, k.glyphs, k.mode, k.call, k.first)
+                        == (&key.sources, key.glyphs, key.mode, key.call, key.first)
                 };
                 self.classifier.programs.made.retain(|k, _| !same(k));
                 let made = CachedDraw {
@@ -363,16 +396,16 @@ impl Context {
         &mut self,
         mode: u32,
         sources: &Sources,
+        glyphs: Option<(GlyphArrays, Instances)>,
         elements: impl FnOnce() -> Result<Elements<'c>, &'static str>,
     ) -> Result<(Arc<Geometry>, Arc<Attributes>), &'static str> {
         let elements = elements()?;
         let (_, count) = elements.span();
         let read = |s: &Option<ArraySource>| s.map(|s| s.read(&elements)).transpose();
         let [position, normal, color, tex, _, _, picture] = sources;
-        let positions = positions(&read(position)?.ok_or("a program without positions")?)?;
-        let triangles = elements
+        let mut positions = positions(&read(position)?.ok_or("a program without positions")?)?;
+        let mut triangles = elements
             .triangles(mode, &elements.plain_split(self.state.snapshot.first_vertex_provokes));
-        let geometry = self.capture.geometry_cache.of_indices(&positions, &triangles);
         let mut attributes = Attributes::constant(&CurrentAttributes::default());
         if let Some(p) = read(normal)? {
             attributes.normals = Values::Packed(Arc::new(p));
@@ -392,6 +425,11 @@ impl Context {
                 }
             };
         }
+        if let Some((arrays, instances)) = glyphs {
+            let glyphs = arrays.read(instances, positions.len(), triangles.len())?;
+            glyphs.repeat(&mut positions, &mut triangles, &mut attributes);
+        }
+        let geometry = self.capture.geometry_cache.of_indices(&positions, &triangles);
         Ok((geometry, Arc::new(attributes)))
     }
 }
@@ -419,10 +457,13 @@ fn read_cells(sources: &Sources, first: i32, triangles: usize) -> Result<CellDat
 }
 
 /// The arguments of a draw call, for its key.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) struct DrawCall {
     pub(crate) first: usize,
     pub(crate) count: usize,
     pub(crate) kind: u32,
     pub(crate) at: usize,
+    /// The number of draws in the call.
+    pub(crate) draws: usize,
+    pub(crate) instances: Option<Instances>,
 }

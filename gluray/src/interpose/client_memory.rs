@@ -14,7 +14,7 @@
 #![allow(unsafe_code, reason = "a room: vertex arrays live in the program's memory")]
 
 use crate::capture::draw::{PackedArray, component_bytes};
-use crate::capture::vertex_arrays::VertexSelection;
+use crate::capture::vertex_selection::{VertexSelection, decode_indices};
 use crate::driver::gl;
 use crate::enums::*;
 use core::marker::PhantomData;
@@ -72,9 +72,27 @@ pub(crate) enum DrawArguments {
     Arrays { first: i32, count: i32 },
     /// `glDrawElements` and its like.
     Elements { count: i32, kind: u32, at: usize, base: i32 },
+    /// `glMultiDrawArrays`: so many draws, and the addresses of their arguments.
+    SeveralArrays { firsts: usize, counts: usize, draws: i32 },
+    /// `glMultiDrawElements` and, with an address of `bases`, `glMultiDrawElementsBaseVertex`.
+    SeveralElements { counts: usize, kind: u32, at: usize, bases: usize, draws: i32 },
     /// `glArrayElement`.
     Element(i32),
 }
+
+/// One of several draws in a call.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct OneDraw {
+    /// The first vertex, or the address of the indices.
+    pub(crate) at: usize,
+    pub(crate) count: usize,
+    pub(crate) base: i32,
+}
+
+/// The most vertices of several draws in a call: 1 GB.
+const MOST_LISTED: usize = 1 << 28;
+const NEGATIVE: &str = "a negative count";
+const FAR: &str = "arrays beyond the end of memory";
 
 /// A draw call that the program is in.
 pub(crate) struct ActiveCall<'c> {
@@ -92,6 +110,90 @@ impl ActiveCall<'_> {
 
     pub(crate) fn named(&self) -> DrawArguments {
         self.named
+    }
+
+    /// The draws of a call for several. Their vertices are listed one by one, so there is a limit.
+    pub(crate) fn several(&self) -> Result<Vec<OneDraw>, &'static str> {
+        let number = |n: i32| usize::try_from(n).map_err(|_| NEGATIVE);
+        // SAFETY: the call names so many integers there, for each draw one.
+        let ints = |at: usize, n: usize| unsafe { view(at, 4 * n) };
+        let int = |bytes: &[u8], i: usize| match bytes.as_chunks::<4>().0.get(i) {
+            Some(b) => i32::from_ne_bytes(*b),
+            None => 0,
+        };
+        let draws: Result<Vec<OneDraw>, &'static str> = match self.named {
+            DrawArguments::SeveralArrays { firsts, counts, draws } => {
+                let n = number(draws)?;
+                let (firsts, counts) = (ints(firsts, n), ints(counts, n));
+                let one = |i| -> Result<OneDraw, &'static str> {
+                    let (at, count) = (number(int(firsts, i))?, number(int(counts, i))?);
+                    Ok(OneDraw { at, count, base: 0 })
+                };
+                (0..n).map(one).collect()
+            }
+            DrawArguments::SeveralElements { counts, at, bases, draws, .. } => {
+                const WIDTH: usize = size_of::<usize>();
+                let n = number(draws)?;
+                let (counts, bases) = (ints(counts, n), ints(bases, n));
+                // SAFETY: the call names an address or an offset there for each draw.
+                let places = unsafe { view(at, WIDTH * n) }.as_chunks::<WIDTH>().0;
+                let one = |i| -> Result<OneDraw, &'static str> {
+                    let at = places.get(i).map_or(0, |b| usize::from_ne_bytes(*b));
+                    Ok(OneDraw { at, count: number(int(counts, i))?, base: int(bases, i) })
+                };
+                (0..n).map(one).collect()
+            }
+            _ => Ok(Vec::new()),
+        };
+        let draws = draws?;
+        match draws.iter().try_fold(0_usize, |n, d| n.checked_add(d.count)) {
+            Some(..=MOST_LISTED) => Ok(draws),
+            _ => Err("more than 268,435,456 vertices of several draws"),
+        }
+    }
+
+    /// The indices of several draws, and where those of each end.
+    fn indices_of_several(
+        &self,
+        kind: u32,
+        restart: Option<u32>,
+    ) -> Result<(Vec<u32>, Vec<usize>), &'static str> {
+        let width = index_width(kind)?;
+        let draws = self.several()?;
+        let bytes_of = |d: &OneDraw| d.count.checked_mul(width).ok_or(FAR);
+        let (mut indices, mut ends) = (Vec::new(), Vec::new());
+        let buffer = gl::word(ELEMENT_ARRAY_BUFFER_BINDING);
+        let real = || draws.iter().filter(|d| d.count > 0);
+        let from = real().map(|d| d.at).min().unwrap_or(0);
+        let mut kept = Vec::new();
+        if buffer != 0 {
+            let mut end = from;
+            for d in real() {
+                end = end.max(d.at.checked_add(bytes_of(d)?).ok_or(FAR)?);
+            }
+            kept = read_buffer(buffer, from, end - from)?;
+        }
+        for d in &draws {
+            let length = bytes_of(d)?;
+            let bytes = match buffer {
+                _ if length == 0 => &[],
+                0 if d.at == 0 => return Err("indices without an address"),
+                // SAFETY: the call names so many indices there.
+                0 => unsafe { view(d.at, length) },
+                _ => &kept[d.at - from..][..length],
+            };
+            indices.extend(decode_indices(bytes, width, d.base, restart));
+            ends.push(indices.len());
+        }
+        Ok((indices, ends))
+    }
+}
+
+/// The bytes of an index.
+fn index_width(kind: u32) -> Result<usize, &'static str> {
+    match kind {
+        UNSIGNED_BYTE | UNSIGNED_SHORT | UNSIGNED_INT => Ok(component_bytes(kind)),
+        _ => Err("indices of a type that OpenGL refuses"),
     }
 }
 
@@ -111,7 +213,6 @@ impl<'c> Elements<'c> {
         call: &'c ActiveCall<'_>,
         restart: Option<u32>,
     ) -> Result<Elements<'c>, &'static str> {
-        const NEGATIVE: &str = "a negative count";
         let which = match call.named {
             DrawArguments::Arrays { first, count } => {
                 match (usize::try_from(first), usize::try_from(count)) {
@@ -125,10 +226,7 @@ impl<'c> Elements<'c> {
             },
             DrawArguments::Elements { count, kind, at, base } => {
                 let n = usize::try_from(count).map_err(|_| NEGATIVE)?;
-                let width = component_bytes(kind);
-                if !matches!(kind, UNSIGNED_BYTE | UNSIGNED_SHORT | UNSIGNED_INT) {
-                    return Err("indices of a type that OpenGL refuses");
-                }
+                let width = index_width(kind)?;
                 let buffer = gl::word(ELEMENT_ARRAY_BUFFER_BINDING);
                 let bytes: Cow<'_, [u8]> = match buffer {
                     0 if at == 0 => return Err("indices without an address"),
@@ -137,7 +235,21 @@ impl<'c> Elements<'c> {
                     0 => Cow::Borrowed(unsafe { view(at, n * width) }),
                     buffer => Cow::Owned(read_buffer(buffer, at, n * width)?),
                 };
-                VertexSelection::indexed(&bytes, width, base, restart)?
+                let indices = decode_indices(&bytes, width, base, restart).collect();
+                VertexSelection::indexed(indices, restart.is_some())?
+            }
+            DrawArguments::SeveralArrays { .. } => {
+                let (mut vertices, mut ends) = (Vec::new(), Vec::new());
+                for d in call.several()? {
+                    let end = d.at.checked_add(d.count).and_then(|end| u32::try_from(end).ok());
+                    vertices.extend(d.at as u32..end.ok_or(FAR)?);
+                    ends.push(vertices.len());
+                }
+                VertexSelection::several(vertices, ends, false, false)?
+            }
+            DrawArguments::SeveralElements { kind, .. } => {
+                let (indices, ends) = call.indices_of_several(kind, restart)?;
+                VertexSelection::several(indices, ends, true, restart.is_some())?
             }
         };
         Ok(Elements(which, PhantomData))
@@ -192,7 +304,6 @@ impl ArrayLayout {
     /// The offset and length of vertices `first..first + count`, or the reason why they cannot be
     /// read.
     fn range(&self, first: usize, count: usize) -> Result<(usize, usize), &'static str> {
-        const FAR: &str = "arrays beyond the end of memory";
         let element = self.element();
         if element == 0 || self.size > 4 {
             return Err("an array of a type that is not read");

@@ -1,5 +1,7 @@
 """Small OpenGL programs, one per hard case. `hard_cases.py CASE OUT` draws the case in a window and writes OUT: width, height, RGB bytes, and depth as
 floats, bottom row first."""
+import math
+
 from gl_by_ctypes import *
 from mode_scenes import *
 from texture_scenes import *
@@ -37,6 +39,109 @@ def byte_normals():
     F("glEnableClientState", c_uint)(0x8074)
     F("glEnableClientState", c_uint)(0x8075)
     F("glDrawArrays", c_uint, c_int, c_int)(QUADS, 0, 4)
+
+
+def fans(first=0):
+    """Two fans and a strip of arrays; the numbers of their first vertices, and of their vertices."""
+    corners = []
+    for cx, cy in ((-0.6, -0.5), (0.6, 0.5)):
+        corners += [(cx, cy, 0.2)] + [(cx + 0.5 * math.cos(0.9 * k), cy + 0.5 * math.sin(0.9 * k), -0.1 * k) for k in range(7)]
+    corners += [(0.4 * (k // 2) - 1, 0.25 * (k % 2) + 0.6, 0.1 * k) for k in range(6)]
+    return [(9.0, 9.0, 9.0)] * first + corners, (first, first + 8, first + 16), (8, 8, 6)
+
+
+def arrays_of(corners):
+    """Arrays of positions, colours and normals in the program's memory."""
+    numbers = [v for x, y, z in corners for v in (x, y, z)]
+    colors = [v for x, y, z in corners for v in (abs(x) % 1, abs(y) % 1, abs(z) % 1)]
+    kept = [(c_float * len(numbers))(*numbers), (c_float * len(colors))(*colors)]
+    F("glVertexPointer", c_int, c_uint, c_int, c_void_p)(3, 0x1406, 0, kept[0])
+    F("glColorPointer", c_int, c_uint, c_int, c_void_p)(3, 0x1406, 0, kept[1])
+    enable_array(0x8074)
+    enable_array(0x8076)
+    return kept
+
+
+def ints(*values):
+    return (c_int * len(values))(*values)
+
+
+def several_ranges():
+    """Several ranges of arrays in one call: fans that share no triangle, and quads that are split as one by one."""
+    simple()
+    corners, firsts, counts = fans(2)
+    kept = arrays_of(corners)
+    draw = F("glMultiDrawArrays", c_uint, c_void_p, c_void_p, c_int)
+    draw(FAN, ints(*firsts[:2]), ints(*counts[:2]), 2)
+    draw(STRIP, ints(firsts[2], 0), ints(counts[2], 0), 2)
+    kept += arrays_of([(x + dx, y - 0.9, 0.3 * x * y) for dx in (-0.7, 0.2) for x, y in ((0, 0), (0.5, 0), (0.5, 0.4), (0, 0.6))])
+    draw(QUADS, ints(4, 0), ints(4, 4), 2)
+    draw(QUADS, ints(0), ints(4), 0)
+
+
+def several_clipped_quads():
+    """Quads of several ranges, one of which the near plane cuts: the driver splits those of that range alone the other way."""
+    start(perspective=True)
+    # The eye is 2 in front of the origin, the near plane 1.
+    corners = ((-1.5, -1.2, 0), (-0.1, -1.2, 0), (-0.1, 1, 0), (-1.5, 0.6, 0)), ((0.1, -1.2, 0), (1.5, -1.2, 0), (1.2, 1, 1.3), (0.1, 0.6, 1.2))
+    kept = arrays_of([corner for quad in corners for corner in quad])
+    F("glMultiDrawArrays", c_uint, c_void_p, c_void_p, c_int)(QUADS, ints(0, 4), ints(4, 4), 2)
+
+
+def several_lists_of_indices():
+    """Several lists of indices in one call, in the program's memory and in a buffer, with a base for each and without."""
+    simple()
+    corners, firsts, counts = fans()
+    kept = arrays_of(corners)
+    lists_of = [(c.c_uint16 * n)(*range(n)) for n in counts]
+    places = (c_void_p * 3)(*[c.addressof(a) for a in lists_of])
+    F("glMultiDrawElementsBaseVertex", c_uint, c_void_p, c_uint, c_void_p, c_int, c_void_p)(FAN, ints(*counts[:2]), 0x1403, places, 2, ints(*firsts[:2]))
+    name = c_uint()
+    F("glGenBuffers", c_int, c_void_p)(1, c.byref(name))
+    F("glBindBuffer", c_uint, c_uint)(0x8893, name)
+    indices = (c.c_uint8 * 10)(255, 16, 17, 18, 19, 20, 21, 17, 16, 18)
+    F("glBufferData", c_uint, c.c_ssize_t, c_void_p, c_uint)(0x8893, 10, indices, 0x88E4)
+    F("glMultiDrawElements", c_uint, c_void_p, c_uint, c_void_p, c_int)(STRIP, ints(3, 6), 0x1401, (c_void_p * 2)(7, 1), 2)
+    F("glBindBuffer", c_uint, c_uint)(0x8893, 0)
+    kept.append(lists_of)
+
+
+def in_a_list(draw):
+    new, done, call = lists()
+    start()
+    new(7, 0x1300)
+    draw()
+    done()
+    simple()
+    call(7)
+
+
+def several_ranges_in_a_list():
+    in_a_list(several_ranges)
+
+
+def several_lists_of_indices_in_a_list():
+    in_a_list(several_lists_of_indices)
+
+
+def several_draws_that_are_refused():
+    """Calls with errors draw nothing and report them; instances without a program are the driver's."""
+    simple()
+    corners, firsts, counts = fans()
+    kept = arrays_of(corners)
+    draw = F("glMultiDrawArrays", c_uint, c_void_p, c_void_p, c_int)
+    said = F("glGetError")
+    draw(FAN, ints(*firsts[:2]), ints(*counts[:2]), -1)
+    assert said() == 0x0501
+    draw(FAN, ints(*firsts[:2]), ints(-8, 8), 2)
+    assert said() == 0x0501
+    elements = F("glMultiDrawElements", c_uint, c_void_p, c_uint, c_void_p, c_int)
+    elements(FAN, ints(4), 0x1406, (c_void_p * 1)(c.addressof(ints(0, 1, 2, 3))), 1)
+    assert said() == 0x0500
+    draw(FAN, ints(*firsts[:2]), ints(*counts[:2]), 2)
+    instanced = F("glDrawArraysInstanced", c_uint, c_int, c_int, c_int)
+    instanced(STRIP, firsts[2], counts[2], 3)
+    kept.append(0)
 
 
 def mirrored_model_view():

@@ -355,5 +355,80 @@ def shadows():
     renderer.SetPass(camera)
 
 
+def glyph_points(count=6):
+    """A grid of points with directions, sizes and values."""
+    points = vtk.vtkPoints()
+    arrays = [made("FloatArray", Name=name, NumberOfComponents=n) for name, n in (("direction", 3), ("size", 1), ("value", 1))]
+    for k in range(count ** 3):
+        x, y, z = k % count, k // count % count, k // count ** 2
+        points.InsertNextPoint(x / count - 0.4, y / count - 0.4, z / count - 0.4)
+        arrays[0].InsertNextTuple3(1 + x, y - 2, z - x)
+        arrays[1].InsertNextTuple1(0.4 + (k * 7 % 11) / 11)
+        arrays[2].InsertNextTuple1(k * 5 % 17)
+    data = vtk.vtkPolyData()
+    data.SetPoints(points)
+    for array in arrays:
+        data.GetPointData().AddArray(array)
+    data.GetPointData().SetActiveScalars("value")
+    return data
+
+
+def glyph(i, source, size=0.13, count=6):
+    """Copies of `source` at the points of place `i`, turned, scaled and coloured by them."""
+    mapper = made("Glyph3DMapper", InputData=glyph_points(count), OrientationArray="direction", ScaleArray="size", ScaleFactor=size)
+    mapper.SetScaleModeToScaleByMagnitude()
+    mapper.SetScalarRange(0, 16)
+    mapper.SetSourceConnection(source.GetOutputPort())
+    actor = made("Actor", Mapper=mapper, Position=place(i))
+    actor.GetProperty().SetColor(0.9, 0.4, 0.2)
+    actor.GetProperty().SetSpecular(0.3)
+    renderer.AddActor(actor)
+    return actor
+
+
+def glyphs():
+    """One source at many points: with and without normals, of one colour, scaled along the axes, clipped."""
+    ball = made("SphereSource", ThetaResolution=12, PhiResolution=10)
+    glyph(0, ball)
+    clip(glyph(1, made("ConeSource", Resolution=7)), 1, (-1, 0.3, -0.2))
+    plain = glyph(2, made("CubeSource"), size=0.1)
+    plain.GetMapper().ScalarVisibilityOff()
+    plain.SetScale(1, 0.7, 0.8)
+    clip(glyph(3, ball), 3, (0.2, -1, 0.3))
+
+
+def two_sided_glyphs():
+    """Clipped, so that back faces are seen, which have their own material."""
+    for i in range(4):
+        actor = glyph(i, made("ConeSource", Resolution=7) if i % 2 else made("SphereSource"), size=0.4, count=3)
+        actor.SetBackfaceProperty(made("Property", Color=(0.1, 0.8, 0.3), Specular=0.2))
+        clip(actor, i, (0.2, -1, 0.3))
+
+
+def lit_glyphs():
+    """The same under lamps and without light, and physically based."""
+    lights()
+    renderer.RemoveAllViewProps()
+    ball = made("SphereSource", ThetaResolution=12, PhiResolution=10)
+    glyph(0, ball)
+    glyph(1, made("ConeSource", Resolution=7))
+    metal(glyph(2, ball))
+    glyph(3, ball).GetProperty().LightingOff()
+
+
+def translucent_glyphs():
+    ball = made("SphereSource", ThetaResolution=12, PhiResolution=10)
+    glyph(0, ball, count=3, size=0.3).GetProperty().SetOpacity(0.4)
+    glyph(3, made("ConeSource", Resolution=7)).GetProperty().SetOpacity(0.6)
+    sphere(0, radius=0.3)
+
+
+def peeled_glyphs():
+    translucent_glyphs()
+    renderer.SetUseDepthPeeling(1)
+    renderer.SetMaximumNumberOfPeels(50)
+    renderer.SetOcclusionRatio(0.0)
+
+
 globals()[kind]()
 show(renderer, samples, frames)

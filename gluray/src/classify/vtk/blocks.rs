@@ -27,6 +27,13 @@ pub(super) const CLIPPED_LATER: &str = "clipVertexMC = vertexMC;";
 pub(super) const VERTEX_VIEW: &str = "vertexVCVSOutput = MCVCMatrix * vertexMC;";
 pub(super) const VERTEX_PLACE: &str = "gl_Position = MCDCMatrix * vertexMC;";
 
+/// The vertex shader of glyphs: copies of a source, each with a matrix, a matrix for normals and a
+/// colour. The blocks above then place `vertex`.
+pub(super) const GLYPH: &str = "vec4 vertex = GCMCMatrix * vertexMC;";
+pub(super) const GLYPH_COLOR: &str = "vertexColorVSOutput = glyphColor;";
+pub(super) const GLYPH_NORMAL: &str =
+    "normalVCVSOutput = normalMatrix * glyphNormalMatrix * normalMC;";
+
 // ---- The geometry shader that measures edges ----------------------------------------------------
 /// VTK 9.1 and 9.2 have one that also enlarges triangles. That one is not recognised.
 pub(super) const MEASURES: &str = "vec2 pos[4];
@@ -162,6 +169,19 @@ pub(super) const BACK: [&str; 2] = [
 pub(super) const OVERRIDES: &str = "if (OverridesColor) {
        ambientColor = ambientColorUniform * ambientIntensity;
        diffuseColor = diffuseColorUniform * diffuseIntensity; }";
+
+/// The colour of a glyph, over the uniforms', where back faces have none of their own and where they
+/// have.
+pub(super) const GLYPH_COLORS: [&str; 2] = [
+    "diffuseColor = diffuseIntensity * vertexColorVSOutput.rgb;
+     ambientColor = ambientIntensity * vertexColorVSOutput.rgb;
+     opacity = opacity * vertexColorVSOutput.a;",
+    "diffuseColor = (gl_FrontFacing) ? diffuseIntensity * vertexColorVSOutput.rgb :
+       diffuseIntensityBF * diffuseColorUniformBF;
+     ambientColor = (gl_FrontFacing) ? ambientIntensity * vertexColorVSOutput.rgb :
+       ambientIntensityBF * ambientColorUniformBF;
+     opacity = (gl_FrontFacing) ? opacity * vertexColorVSOutput.a : opacityUniformBF;",
+];
 
 pub(super) const EDGES: &str = "float edist[3];
      edist[0] = dot(edgeEqn[0].xy, gl_FragCoord.xy) + edgeEqn[0].w;

@@ -31,6 +31,7 @@ wire_struct!(VtkShaderSignature {
     depth_offset,
     cosines_from_zero,
     lobes_have_an_end,
+    glyphs,
 });
 wire_struct!(PositionalLight { position, attenuation, cone_deg, exponent });
 wire_struct!(ProgramLight { direction, color, lamp });

@@ -13,7 +13,7 @@ pub(super) enum ShaderStage {
 }
 
 /// The inputs and outputs of VTK's surfaces, with the suffix of vertex shaders if any.
-const PASSED_ON: [&str; 13] = [
+const PASSED_ON: [&str; 16] = [
     "vertexMC",
     "normalMC",
     "scalarColor",
@@ -27,6 +27,9 @@ const PASSED_ON: [&str; 13] = [
     "colorTCoordVCVSOutput",
     "vertexColorVSOutput",
     "clipDistancesVSOutput",
+    "glyphColor",
+    "GCMCMatrix",
+    "glyphNormalMatrix",
 ];
 
 /// The macros of VTK's preambles, which rename what has other names in other dialects.

@@ -139,6 +139,18 @@ pub(crate) struct VtkProgram {
 /// The most clipping planes of VTK's shaders.
 const MOST_PLANES: i32 = 6;
 
+impl CellData {
+    /// The same for copies of the draw, one after the other.
+    pub(super) fn repeated(self, times: usize) -> CellData {
+        match self.sides {
+            Some(sides) if times != 1 => {
+                CellData { sides: Some(Arc::new(sides.repeat(times))), ..self }
+            }
+            sides => CellData { sides, ..self },
+        }
+    }
+}
+
 impl VtkProgram {
     /// Reads the present uniforms.
     pub(super) fn from_uniforms(
