@@ -541,6 +541,13 @@ fn modes_beyond_match_keep_clipping_planes_and_say_what_paths_leave_out() {
         let overlap = compare(&native, &ours).overlap;
         assert!(overlap > 0.95 && report.traced_draws >= 4, "{mode}: {overlap}, {report:?}");
     }
+    // The halves that are clipped away cast no shadow on those that remain.
+    let (shaded, _) = picture("clipped", Some(&["--mode", "rich"]));
+    let brightness = |p: &[u8; 3]| p.iter().map(|v| u32::from(*v)).sum::<u32>();
+    let both = native.pixels.iter().zip(&shaded.pixels);
+    let surface = || both.clone().filter(|(n, _)| brightness(n) > 120);
+    let dark = surface().filter(|(n, s)| 4 * brightness(s) < brightness(n)).count();
+    assert!(20 * dark < surface().count(), "{dark} of {} pixels", surface().count());
     for (kind, what) in [("edges", "edges of cells"), ("both_sides", "materials of back faces")] {
         let (_, report) = picture(kind, Some(&["--mode", "path"]));
         let said = format!("mode path: {what} are left out");

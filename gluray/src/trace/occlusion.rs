@@ -171,10 +171,12 @@ impl<'a> RayScene<'a> {
             let Some(m) = self.object_from_eye[i].filter(|_| !self.clear[i]) else { return false };
             let p = &self.draws[i];
             let (origin, dir) = (m.transform_point3(from), m.transform_vector3(dir));
+            let Some([t0, t1]) = above(p.clip_planes(), origin, dir, most) else { return false };
             let (ray, moved) = p.world.ray_from_world(origin, dir);
-            let t_max = (most - moved) as f32;
+            let [t0, t1] = [t0, t1].map(|t| (t - moved) as f32);
             p.world.occluded(&Ray {
-                t_max: if t_max.is_finite() { t_max } else { f32::INFINITY },
+                t_min: ray.t_min.max(t0),
+                t_max: if t1.is_finite() { t1 } else { f32::INFINITY },
                 ..ray
             })
         })
@@ -244,6 +246,25 @@ impl<'a> RayScene<'a> {
     }
 }
 
+/// The part of a ray, up to `most`, where a draw is that these planes clip: the points above all of
+/// them. What is clipped away casts no shadow.
+fn above(planes: &[[f64; 4]], origin: DVec3, dir: DVec3, most: f64) -> Option<[f64; 2]> {
+    let (mut t0, mut t1) = (0.0_f64, most);
+    for &[a, b, c, d] in planes {
+        let normal = DVec3::new(a, b, c);
+        let (height, climb) = (normal.dot(origin) + d, normal.dot(dir));
+        let crossing = -height / climb;
+        if climb > 0.0 {
+            t0 = t0.max(crossing);
+        } else if climb < 0.0 {
+            t1 = t1.min(crossing);
+        } else if height < 0.0 {
+            return None;
+        }
+    }
+    (t0 <= t1).then_some([t0, t1])
+}
+
 /// Random numbers that depend only on the pixel, so that a still image does not flicker.
 pub(crate) struct PixelRng(SplitMix64);
 
@@ -289,6 +310,20 @@ mod tests {
         assert!(!LightPosition::Directional(DVec3::new(0.1, 0.0, 1.0)).follows_rays_of(parallel));
         assert!(!LightPosition::Directional(DVec3::NEG_Z).follows_rays_of(parallel));
         assert!(!LightPosition::Positional(DVec3::ZERO).follows_rays_of(parallel));
+    }
+
+    #[test]
+    fn a_ray_meets_a_clipped_draw_only_above_its_planes() {
+        let plane = |n: DVec3, d| [n.x, n.y, n.z, d];
+        let (from, dir) = (DVec3::new(0.0, 0.0, -2.0), DVec3::Z * 0.5);
+        let part = |planes: &[[f64; 4]]| above(planes, from, dir, 100.0);
+        assert_eq!(part(&[]), Some([0.0, 100.0]));
+        assert_eq!(part(&[plane(DVec3::Z, 0.0)]), Some([4.0, 100.0]), "above z = 0");
+        assert_eq!(part(&[plane(-DVec3::Z, 1.0)]), Some([0.0, 6.0]), "below z = 1");
+        assert_eq!(part(&[plane(DVec3::Z, 0.0), plane(-DVec3::Z, 1.0)]), Some([4.0, 6.0]));
+        assert_eq!(part(&[plane(DVec3::Z, -3.0), plane(-DVec3::Z, 1.0)]), None);
+        assert_eq!(part(&[plane(DVec3::X, -1.0)]), None, "along a plane, below it");
+        assert_eq!(part(&[plane(DVec3::X, 1.0)]), Some([0.0, 100.0]), "along a plane, above it");
     }
 
     #[test]
