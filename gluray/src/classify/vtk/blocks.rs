@@ -170,8 +170,8 @@ pub(super) const OVERRIDES: &str = "if (OverridesColor) {
        ambientColor = ambientColorUniform * ambientIntensity;
        diffuseColor = diffuseColorUniform * diffuseIntensity; }";
 
-/// The colour of a glyph, over the uniforms', where back faces have none of their own and where they
-/// have.
+/// The colour of a glyph, over the uniforms', where back faces have none of their own, and where
+/// they have.
 pub(super) const GLYPH_COLORS: [&str; 2] = [
     "diffuseColor = diffuseIntensity * vertexColorVSOutput.rgb;
      ambientColor = ambientIntensity * vertexColorVSOutput.rgb;

@@ -215,83 +215,108 @@ hooks! {
         c.draw(mode, &call)
     };
     fn glDrawArraysInstanced(mode: u32, first: Int, count: Int, n: Int) => |c| {
+        let named = DrawArguments::Arrays { first, count };
         // SAFETY: the program's own call, which waits for us.
-        let call = unsafe { ActiveCall::new(DrawArguments::Arrays { first, count }) };
+        let call = unsafe { ActiveCall::new(named) };
         c.draw_instances(mode, &call, Instances::of(n, 0))
     };
     fn glDrawArraysInstancedARB(mode: u32, first: Int, count: Int, n: Int) => |c| {
+        let named = DrawArguments::Arrays { first, count };
         // SAFETY: the program's own call, which waits for us.
-        let call = unsafe { ActiveCall::new(DrawArguments::Arrays { first, count }) };
+        let call = unsafe { ActiveCall::new(named) };
         c.draw_instances(mode, &call, Instances::of(n, 0))
     };
     fn glDrawArraysInstancedEXT(mode: u32, first: Int, count: Int, n: Int) => |c| {
+        let named = DrawArguments::Arrays { first, count };
         // SAFETY: the program's own call, which waits for us.
-        let call = unsafe { ActiveCall::new(DrawArguments::Arrays { first, count }) };
+        let call = unsafe { ActiveCall::new(named) };
         c.draw_instances(mode, &call, Instances::of(n, 0))
     };
-    fn glDrawArraysInstancedBaseInstance(mode: u32, first: Int, count: Int, n: Int, base: u32) => |c| {
+    fn glDrawArraysInstancedBaseInstance(
+        mode: u32, first: Int, count: Int, n: Int, base: u32
+    ) => |c| {
+        let named = DrawArguments::Arrays { first, count };
         // SAFETY: the program's own call, which waits for us.
-        let call = unsafe { ActiveCall::new(DrawArguments::Arrays { first, count }) };
+        let call = unsafe { ActiveCall::new(named) };
         c.draw_instances(mode, &call, Instances::of(n, base))
     };
     fn glDrawElementsInstanced(mode: u32, count: Int, kind: u32, at: Address, n: Int) => |c| {
+        let named = DrawArguments::Elements { count, kind, at: at as usize, base: 0 };
         // SAFETY: the program's own call, which waits for us.
-        let call = unsafe { ActiveCall::new(DrawArguments::Elements { count, kind, at: at as usize, base: 0 }) };
+        let call = unsafe { ActiveCall::new(named) };
         c.draw_instances(mode, &call, Instances::of(n, 0))
     };
     fn glDrawElementsInstancedARB(mode: u32, count: Int, kind: u32, at: Address, n: Int) => |c| {
+        let named = DrawArguments::Elements { count, kind, at: at as usize, base: 0 };
         // SAFETY: the program's own call, which waits for us.
-        let call = unsafe { ActiveCall::new(DrawArguments::Elements { count, kind, at: at as usize, base: 0 }) };
+        let call = unsafe { ActiveCall::new(named) };
         c.draw_instances(mode, &call, Instances::of(n, 0))
     };
     fn glDrawElementsInstancedEXT(mode: u32, count: Int, kind: u32, at: Address, n: Int) => |c| {
+        let named = DrawArguments::Elements { count, kind, at: at as usize, base: 0 };
         // SAFETY: the program's own call, which waits for us.
-        let call = unsafe { ActiveCall::new(DrawArguments::Elements { count, kind, at: at as usize, base: 0 }) };
+        let call = unsafe { ActiveCall::new(named) };
         c.draw_instances(mode, &call, Instances::of(n, 0))
     };
-    fn glDrawElementsInstancedBaseVertex(mode: u32, count: Int, kind: u32, at: Address, n: Int, base: Int) => |c| {
+    fn glDrawElementsInstancedBaseVertex(
+        mode: u32, count: Int, kind: u32, at: Address, n: Int, base: Int
+    ) => |c| {
+        let named = DrawArguments::Elements { count, kind, at: at as usize, base };
         // SAFETY: the program's own call, which waits for us.
-        let call = unsafe { ActiveCall::new(DrawArguments::Elements { count, kind, at: at as usize, base }) };
+        let call = unsafe { ActiveCall::new(named) };
         c.draw_instances(mode, &call, Instances::of(n, 0))
     };
-    fn glDrawElementsInstancedBaseInstance(mode: u32, count: Int, kind: u32, at: Address, n: Int, instance: u32) => |c| {
+    fn glDrawElementsInstancedBaseInstance(
+        mode: u32, count: Int, kind: u32, at: Address, n: Int, instance: u32
+    ) => |c| {
+        let named = DrawArguments::Elements { count, kind, at: at as usize, base: 0 };
         // SAFETY: the program's own call, which waits for us.
-        let call = unsafe { ActiveCall::new(DrawArguments::Elements { count, kind, at: at as usize, base: 0 }) };
+        let call = unsafe { ActiveCall::new(named) };
         c.draw_instances(mode, &call, Instances::of(n, instance))
     };
-    fn glDrawElementsInstancedBaseVertexBaseInstance(mode: u32, count: Int, kind: u32, at: Address, n: Int, base: Int, instance: u32) => |c| {
+    fn glDrawElementsInstancedBaseVertexBaseInstance(
+        mode: u32, count: Int, kind: u32, at: Address, n: Int, base: Int, instance: u32
+    ) => |c| {
+        let named = DrawArguments::Elements { count, kind, at: at as usize, base };
         // SAFETY: the program's own call, which waits for us.
-        let call = unsafe { ActiveCall::new(DrawArguments::Elements { count, kind, at: at as usize, base }) };
+        let call = unsafe { ActiveCall::new(named) };
         c.draw_instances(mode, &call, Instances::of(n, instance))
     };
     fn glMultiDrawArrays(mode: u32, first: Address, count: Address, n: Int) => |c| {
         let (firsts, counts) = (first as usize, count as usize);
+        let named = DrawArguments::SeveralArrays { firsts, counts, draws: n };
         // SAFETY: the program's own call, which waits for us.
-        let call = unsafe { ActiveCall::new(DrawArguments::SeveralArrays { firsts, counts, draws: n }) };
+        let call = unsafe { ActiveCall::new(named) };
         c.draw(mode, &call)
     };
     fn glMultiDrawArraysEXT(mode: u32, first: Address, count: Address, n: Int) => |c| {
         let (firsts, counts) = (first as usize, count as usize);
+        let named = DrawArguments::SeveralArrays { firsts, counts, draws: n };
         // SAFETY: the program's own call, which waits for us.
-        let call = unsafe { ActiveCall::new(DrawArguments::SeveralArrays { firsts, counts, draws: n }) };
+        let call = unsafe { ActiveCall::new(named) };
         c.draw(mode, &call)
     };
     fn glMultiDrawElements(mode: u32, count: Address, kind: u32, at: Address, n: Int) => |c| {
         let (counts, at, bases) = (count as usize, at as usize, 0);
+        let named = DrawArguments::SeveralElements { counts, kind, at, bases, draws: n };
         // SAFETY: the program's own call, which waits for us.
-        let call = unsafe { ActiveCall::new(DrawArguments::SeveralElements { counts, kind, at, bases, draws: n }) };
+        let call = unsafe { ActiveCall::new(named) };
         c.draw(mode, &call)
     };
     fn glMultiDrawElementsEXT(mode: u32, count: Address, kind: u32, at: Address, n: Int) => |c| {
         let (counts, at, bases) = (count as usize, at as usize, 0);
+        let named = DrawArguments::SeveralElements { counts, kind, at, bases, draws: n };
         // SAFETY: the program's own call, which waits for us.
-        let call = unsafe { ActiveCall::new(DrawArguments::SeveralElements { counts, kind, at, bases, draws: n }) };
+        let call = unsafe { ActiveCall::new(named) };
         c.draw(mode, &call)
     };
-    fn glMultiDrawElementsBaseVertex(mode: u32, count: Address, kind: u32, at: Address, n: Int, base: Address) => |c| {
+    fn glMultiDrawElementsBaseVertex(
+        mode: u32, count: Address, kind: u32, at: Address, n: Int, base: Address
+    ) => |c| {
         let (counts, at, bases) = (count as usize, at as usize, base as usize);
+        let named = DrawArguments::SeveralElements { counts, kind, at, bases, draws: n };
         // SAFETY: the program's own call, which waits for us.
-        let call = unsafe { ActiveCall::new(DrawArguments::SeveralElements { counts, kind, at, bases, draws: n }) };
+        let call = unsafe { ActiveCall::new(named) };
         c.draw(mode, &call)
     };
     fn glBufferData(target: u32, size: isize, data: Address, usage: u32) => |c| c.buffer_written(target);
