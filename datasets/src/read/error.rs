@@ -187,7 +187,21 @@ pub(crate) fn fits(
 
 /// The content of a file.
 pub(crate) fn read_bytes(path: &Path) -> Result<Vec<u8>, ReadError> {
-    std::fs::read(path).map_err(|source| io_error(path, source))
+    let bytes = std::fs::read(path).map_err(|source| io_error(path, source))?;
+    refuse_pointer(path, &bytes)?;
+    Ok(bytes)
+}
+
+/// Refuses the note that Git LFS leaves in the place of a file that it has not fetched.
+pub(crate) fn refuse_pointer(path: &Path, head: &[u8]) -> Result<(), ReadError> {
+    if !head.starts_with(b"version https://git-lfs.github.com/spec/") {
+        return Ok(());
+    }
+    Err(ReadError::Io {
+        path: path.to_path_buf(),
+        source: std::io::Error::other("only a pointer of Git LFS is there"),
+        cure: "fetch the file with `git lfs pull`".into(),
+    })
 }
 
 /// Adds the matching cure to an operating system error.

@@ -22,6 +22,7 @@ pub mod npy;
 pub mod nrrd;
 pub mod obj;
 pub mod obj_pieces;
+mod obj_text;
 mod open;
 pub mod openfoam;
 mod options;

@@ -1,6 +1,7 @@
 //! Wavefront OBJ with its materials (MTL), read with the crate `tobj`.
 
 use super::error::{At, BROKEN, Fault, read_bytes, sibling_path};
+use super::obj_text::{self, Vertices};
 use super::scene::{SceneMesh, SceneModel, SurfaceMaterial, decode_texture};
 use super::{Content, LoadedFile, ReadError};
 use crate::model::polygon::{Division, triangulate};
@@ -26,28 +27,32 @@ pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadErro
         ..Default::default()
     };
     let load_material = |name: &Path| {
-        let file = sibling_path(path, &name.to_string_lossy());
-        match std::fs::read(&file) {
-            Ok(text) => tobj::load_mtl_buf(&mut text.as_slice()),
-            Err(e) => {
-                warnings
-                    .borrow_mut()
-                    .push(format!("materials of {} left out: {e}", file.display()));
-                tobj::load_mtl_buf(&mut [].as_slice())
-            }
-        }
+        let text = material_text(path, &name.to_string_lossy(), &mut warnings.borrow_mut());
+        tobj::load_mtl_buf(&mut text.as_slice())
     };
-    if let Some((line, index)) = oversized_index(bytes) {
+    let (text, vertices) = obj_text::prepared(obj_text::decoded(bytes));
+    if let Some((line, index)) = oversized_index(&text) {
         let what = format!("`{index}` cannot be the number of a vertex");
         return Err(Fault::new(At::Line(line), what, BROKEN).in_file(path, FORMAT));
     }
-    let mut text = bytes;
     let (models, materials) =
-        tobj::load_obj_buf(&mut text, &options, load_material).map_err(|e| {
-            Fault::new(At::Field("the OBJ text".into()), e.to_string(), BROKEN)
-                .in_file(path, FORMAT)
+        tobj::load_obj_buf(&mut &*text, &options, load_material).map_err(|e| {
+            let fault = match obj_text::first_fault(&text) {
+                Some((line, what)) => Fault::new(At::Line(line), what, BROKEN),
+                None => Fault::field("the OBJ text", e.to_string()),
+            };
+            fault.in_file(path, FORMAT)
         })?;
+    if vertices.count == 0 && models.iter().all(|m| m.mesh.indices.is_empty()) {
+        let what = "no vertices and no faces";
+        let cure = "this is another kind of file, or its contents are missing";
+        return Err(Fault::new(At::Byte(0), what, cure).in_file(path, FORMAT));
+    }
     let mut warnings = warnings.into_inner();
+    if (1..vertices.count).contains(&vertices.colored) {
+        let Vertices { count, colored } = vertices;
+        warnings.push(format!("colours left out: {colored} of {count} vertices have one"));
+    }
     let mut scene = SceneModel::default();
     match materials {
         Ok(list) => list.iter().for_each(|m| add_material(m, path, &mut scene, &mut warnings)),
@@ -55,7 +60,7 @@ pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadErro
     }
     // `tobj` skips points and lines, because they would corrupt the attributes of the surrounding
     // faces. They are counted here.
-    let not_faces = bytes
+    let not_faces = text
         .split(|&b| b == b'\n')
         .filter(|l| l.starts_with(b"l ") || l.starts_with(b"p "))
         .count();
@@ -73,6 +78,8 @@ pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadErro
     }
     if not_faces > 0 {
         warnings.push(format!("{not_faces} points and lines left out: only faces are read"));
+    } else if scene.meshes.is_empty() {
+        warnings.push(format!("no faces: {} vertices left out", vertices.count));
     }
     if fanned > 0 {
         warnings.push(format!(
@@ -85,6 +92,28 @@ pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadErro
         warnings,
         time_steps: Vec::new(),
     })
+}
+
+/// The text of the material files that a statement names: one, whose name may have blanks, or
+/// several.
+fn material_text(path: &Path, names: &str, warnings: &mut Vec<String>) -> Vec<u8> {
+    let one = sibling_path(path, names);
+    let files: Vec<_> = match one.is_file() {
+        true => vec![one],
+        false => names.split_whitespace().map(|name| sibling_path(path, name)).collect(),
+    };
+    let mut text = Vec::new();
+    for file in files {
+        match std::fs::read(&file) {
+            Ok(bytes) => {
+                let tell = |what| warnings.push(format!("{}: {what}", file.display()));
+                text.extend(obj_text::prepared_materials(&bytes, tell));
+                text.push(b'\n');
+            }
+            Err(e) => warnings.push(format!("materials of {} left out: {e}", file.display())),
+        }
+    }
+    text
 }
 
 /// The first face index that does not fit in 32 bits, and its line. `tobj` 4.0.5 (`add_vertex`)
@@ -165,9 +194,11 @@ fn add_material(
     // Blinn-Phong exponent to GGX roughness: alpha² = 2/(n+2) (Walter et al. 2007, section 5.1) and
     // roughness² = alpha.
     let from_exponent = m.shininess.map(|n| (2.0 / (n.max(0.0) as f32 + 2.0)).powf(0.25));
+    // `Tr` is the complement of `d`.
+    let opacity = m.dissolve.map(|d| d as f32).or_else(|| extra("Tr").map(|t| 1.0 - t));
     let mut material = SurfaceMaterial {
         name: m.name.clone(),
-        base_color: [r, g, b, m.dissolve.map_or(1.0, |d| d as f32)],
+        base_color: [r, g, b, opacity.unwrap_or(1.0)],
         metallic: extra("Pm").unwrap_or(0.0),
         roughness: extra("Pr").or(from_exponent).unwrap_or(1.0),
         emissive: color(m.emissive, 0.0),

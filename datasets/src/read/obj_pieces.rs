@@ -7,6 +7,7 @@
 use super::ReadError;
 use super::error::{At, BROKEN, Fault, io_error};
 use super::obj::FORMAT;
+use super::obj_text;
 use crate::model::polygon::{Division, triangulate};
 use glam::{DVec3, Vec3};
 use rt_core::mesh::{Attribute, TriMesh};
@@ -74,13 +75,36 @@ struct Lines {
 }
 
 impl Lines {
-    /// Reads the next line; false at the end.
+    /// Reads the next line, with those that continue it; false at the end.
     fn advance(&mut self) -> Result<bool, ReadError> {
         self.line.clear();
-        let read = (&mut self.file).take(MOST_LINE).read_until(b'\n', &mut self.line);
+        let mut read = self.append()?;
+        if self.number == 1 {
+            if self.line.starts_with(&[0xff, 0xfe]) || self.line.starts_with(&[0xfe, 0xff]) {
+                let what = "text in UTF-16".to_owned();
+                return Err(self.fault_with(what, "save it as UTF-8"));
+            }
+            if self.line.starts_with(&[0xef, 0xbb, 0xbf]) {
+                self.line.drain(..3);
+            }
+        }
+        while read && obj_text::continues(&self.line) {
+            let end = self.line.iter().rposition(|&b| b == b'\\').unwrap_or(0);
+            self.line.truncate(end);
+            self.line.push(b' ');
+            read = self.append()?;
+        }
+        Ok(!self.line.is_empty())
+    }
+
+    /// Appends one line of the file; false at the end.
+    fn append(&mut self) -> Result<bool, ReadError> {
+        let before = self.line.len() as u64;
+        let most = MOST_LINE.saturating_sub(before);
+        let read = (&mut self.file).take(most).read_until(b'\n', &mut self.line);
         let read = read.map_err(|e| io_error(&self.path, e))? as u64;
         self.number += 1;
-        if read == MOST_LINE && !self.line.ends_with(b"\n") {
+        if before + read >= MOST_LINE && !self.line.ends_with(b"\n") {
             return Err(self.fault(format!("the line is longer than {MOST_LINE} bytes")));
         }
         Ok(read > 0)
@@ -109,7 +133,11 @@ impl Lines {
     }
 
     fn fault(&self, what: String) -> ReadError {
-        Fault::new(At::Line(self.number), what, BROKEN).in_file(&self.path, FORMAT)
+        self.fault_with(what, BROKEN)
+    }
+
+    fn fault_with(&self, what: String, cure: &str) -> ReadError {
+        Fault::new(At::Line(self.number), what, cure).in_file(&self.path, FORMAT)
     }
 }
 

@@ -1,6 +1,6 @@
 //! Detects the format of a file by its first bytes, or else by the extension of its name.
 
-use super::error::{At, Fault, io_error, read_bytes};
+use super::error::{At, Fault, io_error, read_bytes, refuse_pointer};
 use super::{
     LoadedFile, OpenOptions, ReadError, amrex, cgns, csv, csv_file, ensight, gltf, hdf5, mhd,
     netcdf, npy, nrrd, obj, openfoam, plot3d, ply, raw, stl, tecplot, time_axis, vtk_legacy,
@@ -124,6 +124,7 @@ pub fn open_with(path: impl AsRef<Path>, options: &OpenOptions) -> Result<Loaded
     let length = file.metadata().map_err(|e| io_error(path, e))?.len();
     file.take(HEAD_BYTES).read_to_end(&mut head).map_err(|e| io_error(path, e))?;
 
+    refuse_pointer(path, &head)?;
     refuse_stored(path, &head)?;
     let by_content = match head.starts_with(hdf5::MAGIC) || head.get(512..520) == Some(hdf5::MAGIC)
     {

@@ -114,21 +114,65 @@ fn checked(bytes: &[u8]) -> Result<gltf::Gltf, Fault> {
         return Err(Fault::new(At::Byte(8), what, BROKEN));
     }
     let fault = |e: gltf::Error| {
-        let cure = "check it with the Khronos glTF validator; compressed meshes (Draco, meshopt) \
-                    must be unpacked first";
-        Fault::new(At::Field("the JSON part".into()), e.to_string(), cure)
+        not_read_here(bytes).unwrap_or_else(|| {
+            let cure = "check it with the Khronos glTF validator";
+            Fault::new(At::Field("the JSON part".into()), e.to_string(), cure)
+        })
     };
     let gltf::Gltf { document, blob } =
         gltf::Gltf::from_slice_without_validation(bytes).map_err(fault)?;
-    let json = document.as_json();
+    let json = document.into_json();
     let accessors = json.accessors.len();
     let attributes =
         json.meshes.iter().flat_map(|m| &m.primitives).flat_map(|p| p.attributes.values());
     if let Some(bad) = attributes.map(|a| a.value()).find(|&a| a >= accessors) {
         return Err(Fault::field("meshes", format!("accessor {bad} of {accessors}")));
     }
-    let document = gltf::Document::from_json(document.into_json()).map_err(fault)?;
+    let document = match gltf::Document::from_json(json.clone()) {
+        // Many programs leave the bounds of positions out. They are not used here.
+        Err(gltf::Error::Validation(faults)) if faults.iter().all(is_missing_bound) => {
+            gltf::Document::from_json_without_validation(json)
+        }
+        checked => checked.map_err(fault)?,
+    };
     Ok(gltf::Gltf { document, blob })
+}
+
+/// True for bounds of positions that are not given.
+fn is_missing_bound((path, fault): &(gltf::json::Path, gltf::json::validation::Error)) -> bool {
+    use gltf::json::validation::Error;
+    let path = path.to_string();
+    matches!(fault, Error::Missing)
+        && [".min", ".max"].iter().any(|end| path.ends_with(&format!("[\"POSITION\"]{end}")))
+}
+
+/// What a file is that the crate does not take, if it is known.
+fn not_read_here(bytes: &[u8]) -> Option<Fault> {
+    const OLD: &str = "glTF 1.0";
+    let convert = "convert it to glTF 2.0, for example with gltf-pipeline";
+    let json = match bytes.strip_prefix(b"glTF") {
+        Some([1, 0, 0, 0, ..]) => {
+            return Some(Fault::unsupported(At::Byte(4), OLD, convert));
+        }
+        // The first chunk is the JSON part.
+        Some(rest) => {
+            let length = u32::from_le_bytes(*rest.get(8..)?.first_chunk()?) as usize;
+            rest.get(16..)?.get(..length)?
+        }
+        None => bytes,
+    };
+    let json: serde_json::Value = serde_json::from_slice(json).ok()?;
+    let version = json["asset"]["version"].as_str().unwrap_or("");
+    if version.starts_with("1.") || json["meshes"].is_object() {
+        return Some(Fault::unsupported(At::Field("asset".into()), OLD, convert));
+    }
+    let required = json["extensionsRequired"].as_array()?.iter().filter_map(|e| e.as_str());
+    let packed = required.into_iter().find(|name| name.ends_with("_compression"))?;
+    Some(Fault::unsupported(
+        At::Field("extensionsRequired".into()),
+        format!("meshes packed by {packed}"),
+        "save it without compression, for example with Blender",
+    ))
 }
 
 /// The bytes of every buffer.
