@@ -151,6 +151,87 @@ fn gltf_of_version_1_and_packed_meshes_are_named_and_bounds_may_be_missing() {
     }
 }
 
+/// A glTF file of one triangle with the positions of accessor 0, accessors and views as given, and
+/// a buffer.
+fn triangle(more: &str, mesh: &str, accessors: &str, views: &str, data: &[u8]) -> Vec<u8> {
+    let (bytes, text) = (data.len(), base64::encode(data));
+    format!(
+        r#"{{"asset":{{"version":"2.0"}},"scenes":[{{"nodes":[0]}}],"nodes":[{{"mesh":0}}]{more},
+"meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}}{mesh}}}],"weights":[0.5,0]}}],
+"accessors":[{accessors}],"bufferViews":[{views}],
+"buffers":[{{"byteLength":{bytes},"uri":"data:application/octet-stream;base64,{text}"}}]}}"#
+    )
+    .into_bytes()
+}
+
+fn corners(file: Vec<u8>) -> [DVec3; 3] {
+    let mesh = scene(opened("a.gltf", &file)).meshes.remove(0).mesh;
+    mesh.triangle(0).map(|p| mesh.origin + p.as_dvec3())
+}
+
+#[test]
+fn gltf_sparse_accessors_replace_elements_of_a_view_or_zeros() {
+    let floats: Vec<u8> = [0f32, 0., 0., 1., 0., 0., 0., 1., 0., 5., 6., 7.]
+        .iter()
+        .flat_map(|v| v.to_le_bytes())
+        .collect();
+    let data = [&floats[..], &[1, 0]].concat();
+    let views = r#"{"buffer":0,"byteLength":36},{"buffer":0,"byteOffset":36,"byteLength":12},
+                   {"buffer":0,"byteOffset":48,"byteLength":2}"#;
+    let accessor = |view: &str, number: &str| {
+        format!(
+            r#"{{{view}"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[9,9,9],
+"sparse":{{"count":1,"indices":{{"bufferView":2,"byteOffset":{number},"componentType":5121}},
+"values":{{"bufferView":1}}}}}}"#
+        )
+    };
+    let file = |view, number| triangle("", "", &accessor(view, number), views, &data);
+    let new = DVec3::new(5.0, 6.0, 7.0);
+    assert_eq!(corners(file(r#""bufferView":0,"#, "0")), [DVec3::ZERO, new, DVec3::Y]);
+    assert_eq!(corners(file(r#""bufferView":0,"#, "1")), [new, DVec3::X, DVec3::Y]);
+    assert_eq!(corners(file("", "0")), [DVec3::ZERO, new, DVec3::ZERO]);
+    let far = [&floats[..], &[3, 0]].concat();
+    let file = triangle("", "", &accessor("", "0"), views, &far);
+    assert!(refused("a.gltf", &file).contains("a sparse value for element 3 of 3"));
+    let many = accessor("", "0").replace("\"count\":3", "\"count\":4000000000");
+    assert!(refused("a.gltf", &triangle("", "", &many, views, &data)).contains("without data"));
+}
+
+#[test]
+fn gltf_quantised_positions_are_read_also_where_they_are_required() {
+    let numbers = [0_i16, 0, 0, 0, 32767, 0, 0, 0, 0, 32767, 0, 0];
+    let data: Vec<u8> = numbers.iter().flat_map(|v| v.to_le_bytes()).collect();
+    let accessor = r#"{"bufferView":0,"componentType":5122,"normalized":true,"count":3,
+                       "type":"VEC3","min":[0,0,0],"max":[32767,32767,0]}"#;
+    let view = r#"{"buffer":0,"byteLength":24,"byteStride":8}"#;
+    let required = |name: &str| {
+        let more = format!(r#","extensionsRequired":["{name}"],"extensionsUsed":["{name}"]"#);
+        triangle(&more, "", accessor, view, &data)
+    };
+    let expected = [DVec3::ZERO, DVec3::X, DVec3::Y];
+    assert_eq!(corners(required("KHR_mesh_quantization")), expected);
+    let unlit = opened("a.gltf", &required("KHR_materials_unlit"));
+    assert_eq!(unlit.warnings, ["extensions that are not read: KHR_materials_unlit"]);
+    assert!(refused("a.gltf", &required("EXT_of_another")).contains("Unsupported"));
+}
+
+#[test]
+fn gltf_morph_targets_have_the_weights_of_the_file() {
+    let floats = [0f32, 0., 0., 1., 0., 0., 0., 1., 0., 0., 0., 2., 0., 0., 4., 0., 0., 0.];
+    let data: Vec<u8> = floats.iter().flat_map(|v| v.to_le_bytes()).collect();
+    let accessor = |view: u8| {
+        format!(
+            r#"{{"bufferView":{view},"componentType":5126,"count":3,"type":"VEC3",
+"min":[0,0,0],"max":[9,9,9]}}"#
+        )
+    };
+    let accessors = [accessor(0), accessor(1)].join(",");
+    let views = r#"{"buffer":0,"byteLength":36},{"buffer":0,"byteOffset":36,"byteLength":36}"#;
+    let targets = r#","targets":[{"POSITION":1},{"POSITION":1}]"#;
+    let file = triangle("", targets, &accessors, views, &data);
+    assert_eq!(corners(file), [DVec3::Z, DVec3::new(1.0, 0.0, 2.0), DVec3::Y]);
+}
+
 #[test]
 fn gltf_transforms_turn_mirrored_triangles_back() {
     for (name, bytes) in [("a.gltf", sample_files::gltf()), ("a.glb", sample_files::glb())] {

@@ -392,7 +392,27 @@ pub(crate) fn gltf() -> Vec<u8> {
     .into_bytes()
 }
 
-/// The same scene as a `.glb` file.
+/// A triangle of sparse positions, a corner of which a morph target moves.
+fn gltf_sparse_and_morphed() -> Vec<u8> {
+    let floats = [0f32, 0., 0., 1., 0., 0., 0., 1., 0., 5., 6., 7.];
+    let mut data: Vec<u8> = floats.iter().flat_map(|x| x.to_le_bytes()).collect();
+    data.extend([2, 0]);
+    let text = base64::encode(&data);
+    let sparse = r#""componentType":5126,"count":3,"type":"VEC3","sparse":{"count":1,
+"indices":{"bufferView":2,"componentType":5121},"values":{"bufferView":1}}"#;
+    format!(
+        r#"{{"asset":{{"version":"2.0"}},"scenes":[{{"nodes":[0]}}],"nodes":[{{"mesh":0}}],
+"meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"targets":[{{"POSITION":1}}]}}],
+"weights":[0.5]}}],
+"accessors":[{{"bufferView":0,"min":[0,0,0],"max":[5,6,7],{sparse}}},{{{sparse}}}],
+"bufferViews":[{{"buffer":0,"byteLength":36}},{{"buffer":0,"byteOffset":36,"byteLength":12}},
+{{"buffer":0,"byteOffset":48,"byteLength":2}}],
+"buffers":[{{"byteLength":50,"uri":"data:application/octet-stream;base64,{text}"}}]}}"#
+    )
+    .into_bytes()
+}
+
+/// [`gltf`] as a `.glb` file.
 pub(crate) fn glb() -> Vec<u8> {
     let text = String::from_utf8(gltf()).unwrap();
     let (head, rest) = text.split_once(",\"uri\":\"data:application/octet-stream;base64,").unwrap();
@@ -447,6 +467,7 @@ pub(crate) fn all() -> Vec<Sample> {
         ("a.obj", OBJ.into()),
         ("a.gltf", gltf()),
         ("a.glb", glb()),
+        ("b.gltf", gltf_sparse_and_morphed()),
         ("a.vtkhdf", include_bytes!("../files/image.vtkhdf").to_vec()),
         ("b.vtkhdf", include_bytes!("../files/times.vtkhdf").to_vec()),
         ("a.cgns", include_bytes!("../files/zones.cgns").to_vec()),

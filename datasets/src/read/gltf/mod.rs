@@ -2,19 +2,20 @@
 //! metallic-roughness materials with all their textures.
 //!
 //! The crate `gltf` checks the JSON. Accessors are decoded here, because every offset and count has
-//! to be checked against the buffers. Not read: animation, skins, morph targets, cameras, lights,
-//! compressed meshes; extensions of materials except the index of refraction and the strength of
-//! emission.
+//! to be checked against the buffers. Morph targets have the weights of the file. Not read:
+//! animation, skins, cameras, lights, compressed meshes; extensions of materials except the index
+//! of refraction and the strength of emission.
 
+mod accessors;
 mod materials;
 
 use super::base64::Decoder;
-use super::error::{At, BROKEN, Fault, TRUNCATED, fits, read_bytes, sibling_path};
+use super::error::{At, BROKEN, Fault, read_bytes, sibling_path};
 use super::percent::decoded;
 use super::scene::{SceneMesh, SceneModel};
 use super::{Content, LoadedFile, ReadError};
 use glam::{DMat3, DMat4, DVec3, Vec2, Vec3, Vec4};
-use gltf::accessor::{DataType, Dimensions};
+use gltf::accessor::Dimensions;
 use gltf::mesh::{Mode, Semantic};
 use rt_core::mesh::{Attribute, TriMesh};
 use std::path::Path;
@@ -25,7 +26,9 @@ pub(crate) const FORMAT: &str = "glTF";
 const GLB_HEADER_BYTES: u32 = 12;
 
 /// Supported extensions of glTF 2.0.
-const EXTENSIONS: [&str; 2] = ["KHR_materials_ior", "KHR_materials_emissive_strength"];
+const EXTENSIONS: [&str; 3] = ["KHR_materials_ior", "KHR_materials_emissive_strength", QUANTIZED];
+/// Integers for positions, normals and texture coordinates.
+const QUANTIZED: &str = "KHR_mesh_quantization";
 
 /// Maximum number of triangles in a scene. One mesh may appear many times, so larger scenes are
 /// rejected.
@@ -80,7 +83,8 @@ pub fn read_from_bytes(path: &Path, bytes: &[u8]) -> Result<LoadedFile, ReadErro
         );
         let world_from_node = parent * local;
         if let Some(mesh) = node.mesh() {
-            reader.mesh(&mesh, node.name(), world_from_node).map_err(fault)?;
+            let weights = node.weights().or(mesh.weights()).unwrap_or(&[]);
+            reader.mesh(&mesh, node.name(), weights, world_from_node).map_err(fault)?;
         }
         stack.extend(node.children().map(|c| (c, world_from_node)));
     }
@@ -130,7 +134,9 @@ fn checked(bytes: &[u8]) -> Result<gltf::Gltf, Fault> {
     }
     let document = match gltf::Document::from_json(json.clone()) {
         // Many programs leave the bounds of positions out. They are not used here.
-        Err(gltf::Error::Validation(faults)) if faults.iter().all(is_missing_bound) => {
+        Err(gltf::Error::Validation(faults))
+            if faults.iter().all(|f| is_missing_bound(f) || is_of_appearance(f)) =>
+        {
             gltf::Document::from_json_without_validation(json)
         }
         checked => checked.map_err(fault)?,
@@ -144,6 +150,18 @@ fn is_missing_bound((path, fault): &(gltf::json::Path, gltf::json::validation::E
     let path = path.to_string();
     matches!(fault, Error::Missing)
         && [".min", ".max"].iter().any(|end| path.ends_with(&format!("[\"POSITION\"]{end}")))
+}
+
+/// True for a required extension without which the shape is the same: quantised attributes are
+/// read, and what materials and textures lose is told.
+fn is_of_appearance((path, fault): &(gltf::json::Path, gltf::json::validation::Error)) -> bool {
+    // `extensionsRequired[0] = "KHR_..."`
+    let path = path.to_string();
+    let name = path.split('"').nth(1).filter(|_| path.starts_with("extensionsRequired["));
+    let same_shape = |name: &str| {
+        name == QUANTIZED || name.starts_with("KHR_materials_") || name.starts_with("KHR_texture_")
+    };
+    matches!(fault, gltf::json::validation::Error::Unsupported) && name.is_some_and(same_shape)
 }
 
 /// What a file is that the crate does not take, if it is known.
@@ -214,11 +232,12 @@ impl Reader {
         &mut self,
         mesh: &gltf::Mesh<'_>,
         node_name: Option<&str>,
+        weights: &[f32],
         world_from_node: DMat4,
     ) -> Result<(), Fault> {
         for primitive in mesh.primitives() {
             let name = node_name.or(mesh.name()).unwrap_or("").to_string();
-            if let Some(built) = self.primitive(&primitive, &name, world_from_node)? {
+            if let Some(built) = self.primitive(&primitive, &name, weights, world_from_node)? {
                 self.triangles = self.triangles.saturating_add(built.num_triangles());
                 if self.triangles > MAX_TRIANGLES {
                     let what = format!("more than {MAX_TRIANGLES} triangles in all instances");
@@ -239,6 +258,7 @@ impl Reader {
         &mut self,
         p: &gltf::Primitive<'_>,
         name: &str,
+        weights: &[f32],
         world_from_node: DMat4,
     ) -> Result<Option<TriMesh>, Fault> {
         let mode = p.mode();
@@ -248,8 +268,9 @@ impl Reader {
         }
         let Some(accessor) = p.get(&Semantic::Positions) else { return Ok(None) };
         let place = format!("positions of `{name}`");
+        let targets = p.morph_targets().map(|t| t.positions()).zip(weights.iter().copied());
         let positions: Vec<DVec3> = self
-            .tuples::<3>(&accessor, &place)?
+            .morphed(&accessor, targets, &place)?
             .iter()
             .map(|p| world_from_node.transform_point3(DVec3::from(p.map(f64::from))))
             .collect();
@@ -294,7 +315,8 @@ impl Reader {
             }
         };
         if let Some(a) = p.get(&Semantic::Normals) {
-            let normals = self.tuples::<3>(&a, &format!("normals of `{name}`"))?;
+            let targets = p.morph_targets().map(|t| t.normals()).zip(weights.iter().copied());
+            let normals = self.morphed(&a, targets, &format!("normals of `{name}`"))?;
             one_per_vertex(normals.len(), "normals")?;
             // Normals transform by the inverse transpose; the matrix of cofactors is proportional
             // to it and needs no division that may fail.
@@ -347,85 +369,26 @@ impl Reader {
         Ok(Some(mesh))
     }
 
-    /// Start, stride and number of the elements of an accessor, all inside its buffer.
-    fn elements<'a>(&'a self, a: &gltf::Accessor<'_>, place: &str) -> Result<Vec<&'a [u8]>, Fault> {
-        let at = || At::Field(place.to_string());
-        if a.sparse().is_some() {
-            let cure = "write the file without sparse accessors";
-            return Err(Fault::unsupported(at(), "a sparse accessor", cure));
-        }
-        let Some(view) = a.view() else {
-            return Err(Fault::new(at(), "the accessor has no buffer view", BROKEN));
-        };
-        let size = a.size();
-        let stride = view.stride().unwrap_or(size).max(1);
-        let buffer = &self.buffers[view.buffer().index()];
-        let end = view.offset().checked_add(view.length());
-        let bytes =
-            end.and_then(|end| buffer.get(view.offset()..end)).and_then(|b| b.get(a.offset()..));
-        let Some(bytes) = bytes else {
-            let what = format!("it lies outside its buffer of {} bytes", buffer.len());
-            return Err(Fault::new(at(), what, TRUNCATED));
-        };
-        let count = a.count();
-        // The last element does not need a whole stride after it.
-        let needed = (count as u64)
-            .saturating_sub(1)
-            .checked_mul(stride as u64)
-            .and_then(|n| n.checked_add(size as u64))
-            .unwrap_or(u64::MAX);
-        fits(if count == 0 { 0 } else { needed }, 1, bytes.len(), at(), "bytes of elements")?;
-        Ok((0..count).map(|i| &bytes[i * stride..i * stride + size]).collect())
-    }
-
-    /// The elements as `N` floats each; normalised integers become fractions of their largest
-    /// value.
-    fn tuples<const N: usize>(
+    /// An attribute with the displacements of morph targets, each times its weight (glTF 2.0,
+    /// section 3.7.2.2).
+    fn morphed<'a>(
         &self,
-        a: &gltf::Accessor<'_>,
+        base: &gltf::Accessor<'_>,
+        targets: impl Iterator<Item = (Option<gltf::Accessor<'a>>, f32)>,
         place: &str,
-    ) -> Result<Vec<[f32; N]>, Fault> {
-        if a.dimensions().multiplicity() != N {
-            let what = format!("{:?} instead of {N} components", a.dimensions());
-            return Err(Fault::field(place, what));
+    ) -> Result<Vec<[f32; 3]>, Fault> {
+        let mut values = self.tuples::<3>(base, place)?;
+        for (target, weight) in targets {
+            let Some(target) = target.filter(|_| weight != 0.0) else { continue };
+            let moves = self.tuples::<3>(&target, &format!("morph target of {place}"))?;
+            if moves.len() != values.len() {
+                let what = format!("{} values for {} vertices", moves.len(), values.len());
+                return Err(Fault::field(format!("morph target of {place}"), what));
+            }
+            for (value, by) in values.iter_mut().zip(moves) {
+                (0..3).for_each(|k| value[k] += weight * by[k]);
+            }
         }
-        let kind = a.data_type();
-        let scale = |max: f32| if a.normalized() { 1.0 / max } else { 1.0 };
-        let value = |b: &[u8], c: usize| match kind {
-            DataType::F32 => {
-                f32::from_le_bytes([b[4 * c], b[4 * c + 1], b[4 * c + 2], b[4 * c + 3]])
-            }
-            DataType::U8 => f32::from(b[c]) * scale(255.0),
-            DataType::I8 => f32::from(b[c] as i8) * scale(127.0),
-            DataType::U16 => {
-                f32::from(u16::from_le_bytes([b[2 * c], b[2 * c + 1]])) * scale(65535.0)
-            }
-            DataType::I16 => {
-                f32::from(i16::from_le_bytes([b[2 * c], b[2 * c + 1]])) * scale(32767.0)
-            }
-            DataType::U32 => {
-                u32::from_le_bytes([b[4 * c], b[4 * c + 1], b[4 * c + 2], b[4 * c + 3]]) as f32
-            }
-        };
-        Ok(self
-            .elements(a, place)?
-            .into_iter()
-            .map(|b| std::array::from_fn(|c| value(b, c)))
-            .collect())
-    }
-
-    fn indices(&self, a: &gltf::Accessor<'_>, name: &str) -> Result<Vec<u32>, Fault> {
-        let place = format!("indices of `{name}`");
-        let kind = a.data_type();
-        if a.dimensions() != Dimensions::Scalar
-            || !matches!(kind, DataType::U8 | DataType::U16 | DataType::U32)
-        {
-            return Err(Fault::field(
-                place,
-                format!("{kind:?} {:?} instead of unsigned numbers", a.dimensions()),
-            ));
-        }
-        let value = |b: &[u8]| b.iter().rev().fold(0u32, |n, &x| n << 8 | u32::from(x));
-        Ok(self.elements(a, &place)?.into_iter().map(value).collect())
+        Ok(values)
     }
 }
