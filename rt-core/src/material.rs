@@ -150,6 +150,7 @@ impl Material {
             ambient: 1.0,
             diffuse: 1.0,
             specular: [specular; 3],
+            tinted: false,
             shininess,
             highlight: PhongForm::HalfVector,
             mirror: 0.0,

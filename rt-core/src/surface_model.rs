@@ -30,6 +30,9 @@ pub enum PbrForm {
         /// Least divisor of the distribution term, which bounds the highlights of nearly smooth
         /// surfaces: 10⁻⁸ since VTK 9.7, 0 before.
         min_divisor: f32,
+        /// The only light is a headlight. VTK's shader then lights each point along the ray that
+        /// sees it, whatever direction the light has.
+        headlight: bool,
     },
 }
 
@@ -50,6 +53,9 @@ pub enum SurfaceModel {
         diffuse: f32,
         /// Highlight colour; black for none.
         specular: [f32; 3],
+        /// The highlight is this colour times the surface's, as where a texture multiplies the lit
+        /// colour (OpenGL's `GL_MODULATE`, actors' textures in VTK).
+        tinted: bool,
         /// Exponent of the highlight.
         shininess: f32,
         /// Form of the highlight.

@@ -8,7 +8,7 @@ use rt_core::environment::{Background, Environment};
 use rt_core::frame::Layers;
 use rt_core::glam::{DAffine3, DMat3, DVec3, Vec2, Vec3};
 use rt_core::light::Light;
-use rt_core::material::{ColorSource, Material, PhongForm, Sides, SurfaceModel};
+use rt_core::material::{ColorSource, Material, PbrForm, PhongForm, Sides, SurfaceModel};
 use rt_core::mesh::{Attribute, TriMesh};
 use rt_core::render::RenderOptions;
 use rt_core::scene::{Appearance, SceneBuilder};
@@ -44,6 +44,7 @@ fn phong_highlights_are_opengl_s_and_vtk_s() {
                 ambient: 0.3,
                 diffuse: 0.6,
                 specular: [0.9; 3],
+                tinted: false,
                 shininess,
                 highlight,
                 mirror: 0.0,
@@ -55,6 +56,46 @@ fn phong_highlights_are_opengl_s_and_vtk_s() {
             close(found, expected, &format!("{highlight:?} {shininess}"));
         }
     }
+}
+
+#[test]
+fn tinted_highlights_have_the_surfaces_colour() {
+    let light = Light::directional(DVec3::Z).with_color([0.8; 3]);
+    let of = |tinted: bool| {
+        let model = SurfaceModel::Phong {
+            ambient: 0.0,
+            diffuse: 0.5,
+            specular: [0.6; 3],
+            tinted,
+            shininess: 3.0,
+            highlight: PhongForm::Mirrored,
+            mirror: 0.0,
+        };
+        middle(
+            floor(0.0, 1.0),
+            Material { model, ..Material::matte([0.25, 0.5, 0.0]) },
+            vec![light],
+        )
+    };
+    let (plain, tinted) = (of(false), of(true));
+    for (k, color) in [0.25, 0.5, 0.0].into_iter().enumerate() {
+        close(plain[k], 0.8 * (0.5 * color + 0.6), "plain");
+        close(tinted[k], 0.8 * (0.5 * color + 0.6 * color), "tinted");
+    }
+}
+
+#[test]
+fn vtks_headlight_lights_physically_based_surfaces_along_the_ray() {
+    // The light comes from the side; VTK's shader puts it at the eye.
+    let aside = Light::directional(DVec3::new(1.0, 0.0, 1.0));
+    let of = |headlight: bool, light: Light| {
+        let form = PbrForm::Vtk { min_divisor: 0.0, headlight };
+        let model = SurfaceModel::Pbr { metallic: 0.3, roughness: 0.5, specular: 0.04, form };
+        middle(floor(0.0, 1.0), Material { model, ..Material::matte([0.5; 3]) }, vec![light])[0]
+    };
+    let along = of(false, Light::directional(DVec3::Z));
+    close(of(true, aside), along, "along the ray");
+    assert!((of(false, aside) - along).abs() > 0.01);
 }
 
 #[test]

@@ -6,7 +6,8 @@ use crate::colors::MeshColors;
 use crate::edges::Edges;
 use crate::input::Property;
 use crate::materials::{
-    Encoding, MaterialContext, ambient_as_emission, glyph_factor, material, under_line,
+    Encoding, MaterialContext, ambient_as_emission, glyph_factor, glyph_opacity, material,
+    under_line, under_texture,
 };
 use crate::options::{MaterialChoice, Options};
 use rt_core::bvh::{Geometry, Instance};
@@ -122,6 +123,8 @@ impl Assembled {
             }
             Some(copies) => {
                 let factor = glyph_factor(property, context) / 255.0;
+                let opacity = base.opacity * glyph_opacity(property, context.options);
+                let base = Material { opacity, ..base };
                 let mut by_color: HashMap<Option<[u8; 4]>, usize> = HashMap::new();
                 for (place, rgba) in copies {
                     let m = *by_color.entry(*rgba).or_insert_with(|| match rgba {
@@ -145,6 +148,10 @@ impl Assembled {
     }
 
     fn dressed(&mut self, base: Material, colors: Option<&MeshColors>, d: &FrameSurface) -> usize {
+        let base = match (colors, &d.texture) {
+            (None, Some(_)) => under_texture(base),
+            _ => base,
+        };
         let color_source = match (colors, &d.texture) {
             (Some(MeshColors::Values(_)), _) => ColorSource::Attribute,
             (Some(MeshColors::Mapped(_, map)), _) => ColorSource::Scalars(map.clone()),

@@ -88,6 +88,7 @@ pub fn material(
                 ambient: share,
                 diffuse: 1.0 - share,
                 specular: [0.0; 3],
+                tinted: false,
                 shininess: 1.0,
                 highlight: PhongForm::Mirrored,
                 mirror: options.mirror,
@@ -123,7 +124,7 @@ pub fn material(
         return (Material { model, color, color_transfer, ..base }, encoding);
     }
     if p.pbr {
-        return pbr(p, base, options);
+        return pbr(p, base, context);
     }
     let share = ambient_share(options);
     let same = from_values || p.ambient_color == p.diffuse_color;
@@ -132,6 +133,7 @@ pub fn material(
         ambient: if same { non_negative(p.ambient) } else { 0.0 } + non_negative(p.diffuse) * share,
         diffuse: non_negative(p.diffuse) * (1.0 - share),
         specular,
+        tinted: false,
         shininess: non_negative(p.specular_power),
         highlight: if context.only_headlight {
             PhongForm::TowardsLight
@@ -160,6 +162,30 @@ fn transfer(coefficients: &[f32], pbr: bool, options: &Options) -> ColorTransfer
     }
 }
 
+/// The material under an actor's texture, which VTK multiplies with the lit colour: highlights have
+/// its colour too.
+pub(crate) fn under_texture(mut m: Material) -> Material {
+    // The texture's colour times this is the surface's, so that no channel may be 0.
+    const LEAST: f32 = 1e-6;
+    if let SurfaceModel::Phong { specular, tinted, .. } = &mut m.model
+        && *specular != [0.0; 3]
+    {
+        m.color = m.color.map(|c| c.max(LEAST));
+        *specular = std::array::from_fn(|k| specular[k] / m.color[k]);
+        *tinted = true;
+    }
+    m
+}
+
+/// Opacity of a glyph's colour: VTK's glyph mapper puts the property's into it, and its shader
+/// multiplies both.
+pub(crate) fn glyph_opacity(p: &Property, options: &Options) -> f32 {
+    match options.material {
+        MaterialChoice::Scene | MaterialChoice::Transparent => non_negative(p.opacity).min(1.0),
+        MaterialChoice::Matte | MaterialChoice::Metal | MaterialChoice::Glass => 1.0,
+    }
+}
+
 /// Factor on the colours of single glyphs, which VTK's shader never decodes.
 pub(crate) fn glyph_factor(p: &Property, context: &MaterialContext<'_>) -> f32 {
     let of_scene = [MaterialChoice::Scene, MaterialChoice::Transparent];
@@ -182,6 +208,7 @@ pub(crate) fn under_line(m: &Material, line: [f32; 3], encoding: Encoding) -> Op
                 ambient: 0.0,
                 diffuse: 0.0,
                 specular,
+                tinted: false,
                 shininess,
                 highlight,
                 mirror: 0.0,
@@ -198,7 +225,8 @@ pub(crate) fn under_line(m: &Material, line: [f32; 3], encoding: Encoding) -> Op
     }
 }
 
-fn pbr(p: &Property, base: Material, options: &Options) -> (Material, Encoding) {
+fn pbr(p: &Property, base: Material, context: &MaterialContext<'_>) -> (Material, Encoding) {
+    let options = context.options;
     let f0 = {
         let r = (p.base_ior - 1.0) / (p.base_ior + 1.0);
         non_negative(r * r).min(1.0)
@@ -207,7 +235,10 @@ fn pbr(p: &Property, base: Material, options: &Options) -> (Material, Encoding) 
         metallic: non_negative(p.metallic).min(1.0),
         roughness: non_negative(p.roughness).min(1.0),
         specular: f0,
-        form: PbrForm::Vtk { min_divisor: if options.vtk >= (9, 7) { 1e-8 } else { 0.0 } },
+        form: PbrForm::Vtk {
+            min_divisor: if options.vtk >= (9, 7) { 1e-8 } else { 0.0 },
+            headlight: context.only_headlight,
+        },
     };
     // VTK 9 treats the property's colour as linear here, although it encodes the result.
     let color = base.color.map(|c| c * non_negative(p.diffuse));

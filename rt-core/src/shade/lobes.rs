@@ -25,6 +25,10 @@ pub(crate) fn response(
     color: Vec3,
     highlight: Vec3,
 ) -> Vec3 {
+    let l = match *model {
+        SurfaceModel::Pbr { form: PbrForm::Vtk { headlight: true, .. }, .. } => view,
+        _ => l,
+    };
     let cos = normal.dot(l);
     if cos <= 0.0 {
         return Vec3::ZERO;
@@ -33,9 +37,9 @@ pub(crate) fn response(
         SurfaceModel::Unlit => Vec3::ZERO,
         // A dielectric gets here only when refraction is disabled.
         SurfaceModel::Matte | SurfaceModel::Dielectric { .. } => surface_color * color * cos,
-        SurfaceModel::Phong { diffuse, specular, shininess, highlight: form, .. } => {
+        SurfaceModel::Phong { diffuse, specular, tinted, shininess, highlight: form, .. } => {
             let matte = surface_color * color * (diffuse * cos);
-            let specular = Vec3::from(specular);
+            let specular = Vec3::from(specular) * if tinted { surface_color } else { Vec3::ONE };
             if specular == Vec3::ZERO {
                 return matte;
             }
@@ -74,7 +78,12 @@ fn microfacet_response(
         SurfaceModel::Metal { roughness } => {
             microfacets(surface_color, roughness, normal, view, l) * color
         }
-        SurfaceModel::Pbr { metallic, roughness, specular, form: PbrForm::Vtk { min_divisor } } => {
+        SurfaceModel::Pbr {
+            metallic,
+            roughness,
+            specular,
+            form: PbrForm::Vtk { min_divisor, .. },
+        } => {
             let model = VtkPbr {
                 metallic,
                 roughness,

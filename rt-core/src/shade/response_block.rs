@@ -15,7 +15,7 @@ use glam::Vec3;
 #[derive(Clone, Copy)]
 pub(super) enum Lobe {
     Matte,
-    Phong { diffuse: f32, specular: Vec3, shininess: f32, highlight: PhongForm },
+    Phong { diffuse: f32, specular: Vec3, tinted: bool, shininess: f32, highlight: PhongForm },
 }
 
 impl Lobe {
@@ -23,8 +23,9 @@ impl Lobe {
     #[inline(always)]
     pub(super) fn of(model: &SurfaceModel) -> Lobe {
         match *model {
-            SurfaceModel::Phong { diffuse, specular, shininess, highlight, .. } => {
-                Lobe::Phong { diffuse, specular: Vec3::from(specular), shininess, highlight }
+            SurfaceModel::Phong { diffuse, specular, tinted, shininess, highlight, .. } => {
+                let specular = Vec3::from(specular);
+                Lobe::Phong { diffuse, specular, tinted, shininess, highlight }
             }
             _ => Lobe::Matte,
         }
@@ -54,7 +55,7 @@ pub(super) fn respond<S: Simd>(
     let lit = color.mul(Vec3x16::splat(simd, light.color));
     let answer = match lobe {
         Lobe::Matte => lit.scale(cos),
-        Lobe::Phong { diffuse, specular, shininess, highlight } => {
+        Lobe::Phong { diffuse, specular, tinted, shininess, highlight } => {
             let matte = lit.scale(v(diffuse) * cos);
             if specular == Vec3::ZERO {
                 matte
@@ -71,7 +72,14 @@ pub(super) fn respond<S: Simd>(
                 };
                 let direct_lighting =
                     power_block(simd, base.max(v(least_cosine(highlight))), shininess);
-                matte.add(Vec3x16::splat(simd, specular * light.highlight).scale(direct_lighting))
+                let highlight = if tinted {
+                    Vec3x16::splat(simd, specular)
+                        .mul(color)
+                        .mul(Vec3x16::splat(simd, light.highlight))
+                } else {
+                    Vec3x16::splat(simd, specular * light.highlight)
+                };
+                matte.add(highlight.scale(direct_lighting))
             }
         }
     };

@@ -148,6 +148,7 @@ fn material(p: &Prepared<'_>, appearance: &SurfaceAppearance, settings: &Setting
             ambient: 1.0,
             diffuse: 1.0,
             specular,
+            tinted: false,
             shininess: shininess.max(0.0),
             highlight,
             mirror: if e.reflections { ray_material.mirror } else { 0.0 },

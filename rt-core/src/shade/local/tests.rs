@@ -33,6 +33,13 @@ fn dressed(mesh: TriMesh, face: bool, r: &mut Random) -> TriMesh {
     }
 }
 
+fn tinted(mut m: Material) -> Material {
+    if let SurfaceModel::Phong { tinted, .. } = &mut m.model {
+        *tinted = true;
+    }
+    m
+}
+
 fn towards_light(mut m: Material) -> Material {
     if let SurfaceModel::Phong { highlight, .. } = &mut m.model {
         *highlight = PhongForm::TowardsLight;
@@ -57,7 +64,7 @@ pub(in crate::shade) fn mixed_scene() -> Scene {
         phong(3.0).colored_by_scalars(map(false)),
         Material::matte([1.0; 3]).colored_by_scalars(map(true)).with_emission([0.1, 0.0, 0.2]),
         Material::unlit([0.2, 0.9, 0.4]),
-        towards_light(phong(5.0)),
+        towards_light(tinted(phong(5.0))),
         Material::pbr([0.9, 0.7, 0.2], 0.5, 0.4),
         Material::dielectric(1.5),
     ];
