@@ -5,7 +5,7 @@ arrays are only read in the first frame with a key; later frames pass the key al
 """
 import numpy as np
 from vtkmodules.util.numpy_support import vtk_to_numpy
-from vtkmodules.vtkCommonCore import vtkIdList
+from vtkmodules.vtkCommonCore import vtkIdList, vtkVersion
 from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolygon
 
 from . import library as rtv
@@ -13,8 +13,10 @@ from .arrays import floats, key_of, numbers
 
 _WHOLE = {np.dtype(np.int64), np.dtype(np.int32)}
 _REAL = [np.dtype(np.float64), np.dtype(np.float32)]
-# The wheel's OpenGL draws polygons with fewer corners as fans, and triangulates others properly.
-_DIVIDED_FROM = 7
+# VTK 9.7 triangulates polygons with so many corners that are not convex, and draws all others as fans; earlier versions draw fans only.
+_DIVIDED_FROM = 5 if (vtkVersion.GetVTKMajorVersion(), vtkVersion.GetVTKMinorVersion()) >= (9, 7) else 1 << 62
+# The measure by which it chooses ears: `vtkPolygon::DOT_PRODUCT`.
+_EARS_BY = 1
 
 
 class Shapes:
@@ -129,7 +131,7 @@ def _cells(runs, keep):
 
 
 def _divided(xyz, array, runs):
-    """The polygons, with large non-convex ones cut into triangles, and the old cell index of each new cell."""
+    """The polygons, with non-convex ones cut into triangles as VTK does, and the old cell index of each new cell."""
     if runs is None or array.GetMaxCellSize() < _DIVIDED_FROM:
         return runs, None
     offsets, connectivity = runs
@@ -177,6 +179,6 @@ def _ears(corners):
     for i, p in enumerate(corners):
         polygon.GetPoints().SetPoint(i, *map(float, p))
         polygon.GetPointIds().SetId(i, i)
-    if not polygon.EarCutTriangulation(ids):
+    if not polygon.EarCutTriangulation(ids, _EARS_BY):
         return None
     return np.array([ids.GetId(i) for i in range(ids.GetNumberOfIds())]).reshape(-1, 3)
