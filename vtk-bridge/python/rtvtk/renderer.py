@@ -141,8 +141,10 @@ class _Tracer:
                 prop.VisibilityOff()
             for actor in self.shown:
                 renderer.AddActor(actor)
-            # OpenGL's shadows and occlusion would see the rectangles. The traced image already has its translucent layers in order.
-            for name in ("UseShadows", "UseSSAO", *(["UseDepthPeeling"] if len(self.shown) > 1 else [])):
+            # OpenGL's shadows and occlusion would see the rectangles. The traced image already has its translucent layers in order, so
+            # that only those of other props need to be peeled.
+            in_order = len(self.shown) > 1 and not any(p.HasTranslucentPolygonalGeometry() for p in visible if p not in traced)
+            for name in ("UseShadows", "UseSSAO", *(["UseDepthPeeling"] if in_order else [])):
                 if getattr(renderer, f"Get{name}")():
                     self.switched.append(name)
                     getattr(renderer, f"Set{name}")(False)
