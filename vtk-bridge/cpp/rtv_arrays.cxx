@@ -311,7 +311,7 @@ uint32_t rtvTextureBits(vtkTexture* texture)
 {
   return !texture ? 0
                   : RTV_TEXTURE | (texture->GetTransform() ? RTV_TEXTURE_TRANSFORM : 0u) |
-      (texture->GetCubeMap() ? RTV_TEXTURE_CUBE_MAP : 0u);
+      (texture->GetCubeMap() ? RTV_TEXTURE_CUBE_MAP : 0u) | (texture->GetMipmap() ? RTV_TEXTURE_MIPMAP : 0u);
 }
 
 namespace

@@ -32,6 +32,7 @@
 #include <vtkPlaneCollection.h>
 #include <vtkPolyData.h>
 #include <vtkProperty.h>
+#include <vtkRenderer.h>
 #include <vtkShaderProperty.h>
 #include <vtkTexture.h>
 #include <vtkVolume.h>
@@ -46,6 +47,9 @@ struct BlockState
   double Color[3] = { 1.0, 1.0, 1.0 };
   double Opacity;
 };
+
+// Colours of points and cells replace those of blocks; before VTK 9.4 it was the reverse.
+const bool ScalarsOverBlocks = VTK_VERSION_NUMBER >= VTK_VERSION_CHECK(9, 4, 0);
 
 struct Actor
 {
@@ -192,6 +196,14 @@ const char* AddPolyData(Actor& a, vtkPolyData* data, const BlockState& block, co
     const RtvProperty own = PropertyOf(back);
     memcpy(&s.back, &own, offsetof(RtvProperty, metallic));
     s.back.opacity = 1.0f;
+    if (block.HasColor)
+    {
+      // A block's colour is that of both sides.
+      CopyColor(block.Color, s.back.ambient_color);
+      CopyColor(block.Color, s.back.diffuse_color);
+      s.back.ambient = s.property.ambient;
+      s.back.diffuse = s.property.diffuse;
+    }
   }
   s.point_radius = a.PointRadius;
   s.line_radius = a.LineRadius;
@@ -201,7 +213,7 @@ const char* AddPolyData(Actor& a, vtkPolyData* data, const BlockState& block, co
     return rtvApi->check_surface(a.Bridge, &facts);
   }
   AddClipPlanes(a, pending);
-  if (!block.HasColor)
+  if (!block.HasColor || ScalarsOverBlocks)
   {
     rtvAddColors(a.Bridge, s, a.Mapper, data, keep);
   }
@@ -317,7 +329,37 @@ const char* AddTree(Actor& a, vtkDataObject* data, BlockState block, const std::
   return rtvApi->check_surface(a.Bridge, &facts);
 }
 
-RtvActorFacts FactsOf(vtkActor* actor, vtkMapper* mapper)
+// What blocks may have of their own since VTK 9.3, which is not followed. The overload with `long`
+// is for versions without.
+template <class A>
+auto HasScalarsOfBlocks(const A* a, int) -> decltype(a->HasBlockScalarVisibilities())
+{
+  return a->HasBlockScalarVisibilities() || a->HasBlockUseLookupTableScalarRanges() ||
+    a->HasBlockInterpolateScalarsBeforeMappings() || a->HasBlockColorModes() || a->HasBlockScalarModes() ||
+    a->HasBlockArrayAccessModes() || a->HasBlockArrayComponents() || a->HasBlockArrayIds() || a->HasBlockArrayNames() ||
+    a->HasBlockScalarRanges() || a->HasBlockLookupTables() || a->HasBlockFieldDataTupleIds();
+}
+
+template <class A>
+bool HasScalarsOfBlocks(const A*, long)
+{
+  return false;
+}
+
+// Textures of blocks, since VTK 9.7.
+template <class A>
+auto HasTexturesOfBlocks(const A* a, int) -> decltype(a->HasBlockTextures())
+{
+  return a->HasBlockTextures();
+}
+
+template <class A>
+bool HasTexturesOfBlocks(const A*, long)
+{
+  return false;
+}
+
+RtvActorFacts FactsOf(vtkRenderer* renderer, vtkActor* actor, vtkMapper* mapper)
 {
   RtvActorFacts facts = {};
   facts.actor_class = actor->GetClassName();
@@ -347,6 +389,19 @@ RtvActorFacts FactsOf(vtkActor* actor, vtkMapper* mapper)
     : 0;
   facts.glyphs = mapper->IsA("vtkGlyph3DMapper") ? 1 : 0;
   facts.texture = rtvTextureBits(actor->GetTexture());
+  if (facts.texture && !p->GetShowTexturesOnBackface())
+  {
+    facts.texture |= RTV_TEXTURE_FRONT_ONLY;
+  }
+  double factor = 0.0, units = 0.0;
+  if (vtkMapper::GetResolveCoincidentTopology() == VTK_RESOLVE_POLYGON_OFFSET)
+  {
+    mapper->GetCoincidentTopologyPolygonOffsetParameters(factor, units);
+  }
+  facts.image_lighting = renderer->GetUseImageBasedLighting() && renderer->GetEnvironmentTexture() ? 1 : 0;
+  facts.polygon_offset = factor != 0.0 || units != 0.0 ? 1 : 0;
+  const vtkCompositeDataDisplayAttributes* blocks = BlockAttributes(mapper);
+  facts.block_scalars = blocks && (HasScalarsOfBlocks(blocks, 0) || HasTexturesOfBlocks(blocks, 0)) ? 1 : 0;
   facts.num_textures = static_cast<uint32_t>(p->GetAllTextures().size());
   facts.albedo = rtvTextureBits(p->GetTexture("albedoTex"));
   facts.material = rtvTextureBits(p->GetTexture("materialTex"));
@@ -400,7 +455,7 @@ bool RtvExtractor::Add(RtvBridge* bridge, vtkRenderer* renderer, vtkProp* prop, 
   }
   a.Prop = vtkActor::SafeDownCast(prop);
   a.Mapper = a.Prop ? a.Prop->GetMapper() : nullptr;
-  RtvActorFacts facts = a.Mapper ? FactsOf(a.Prop, a.Mapper) : RtvActorFacts{};
+  RtvActorFacts facts = a.Mapper ? FactsOf(renderer, a.Prop, a.Mapper) : RtvActorFacts{};
   // Refuses everything without a mapper.
   if (const char* reason = rtvApi->check_actor(bridge, &facts))
   {

@@ -345,6 +345,10 @@ typedef struct RtvPicture {
 #define RTV_TEXTURE_TRANSFORM 2u
 /* It is a cube map. */
 #define RTV_TEXTURE_CUBE_MAP 4u
+/* It has mipmaps. */
+#define RTV_TEXTURE_MIPMAP 8u
+/* Back faces do not show it. */
+#define RTV_TEXTURE_FRONT_ONLY 16u
 /* A prop with its property and mapper. Asked about before the mapper is updated, and again if it then has no data. */
 typedef struct RtvActorFacts {
   /* Name of the prop's VTK class. */
@@ -397,8 +401,12 @@ typedef struct RtvActorFacts {
   uint32_t emissive;
   /* 1 if the mapper was updated and has no data. */
   uint32_t no_data;
-  /* Not used. */
-  uint32_t reserved;
+  /* 1 if blocks have scalars, colour maps or textures of their own. */
+  uint32_t block_scalars;
+  /* 1 if OpenGL moves the depths of its polygons, for lines and surfaces in the same plane. */
+  uint32_t polygon_offset;
+  /* 1 if an image lights the renderer's physically based surfaces. */
+  uint32_t image_lighting;
 } RtvActorFacts;
 /* The data of an actor, or one of their blocks, and its surface. Asked about when the cells are known, and again when the surface is complete. */
 typedef struct RtvSurfaceFacts {
@@ -582,7 +590,7 @@ typedef struct RtvSceneVolume {
   double world_from_unit[16];
 } RtvSceneVolume;
 /* Version of this interface, computed from its structures and calls (a test gives the value). A shim built for another version must not continue. */
-#define RTV_ABI 2129185655u
+#define RTV_ABI 1734564159u
 /* All calls in one table, so that a shim needs only one symbol. */
 typedef struct RtvApi {
   /* rtv_abi. */

@@ -1,12 +1,13 @@
 """Asks the library which props it can trace: facts about them, and its reason for OpenGL to draw one."""
 import ctypes as C
 
+from vtkmodules.vtkCommonCore import reference
 from vtkmodules.vtkRenderingCore import vtkGlyph3DMapper
 
 from . import library as rtv
 from .arrays import MAPS
 
-_PBR = 3
+_PBR, _POLYGON_OFFSET = 3, 1
 
 
 class Untraceable(Exception):
@@ -23,11 +24,29 @@ def require(check, facts):
 def texture_bits(texture):
     if texture is None:
         return 0
-    transform, cube = (rtv.TEXTURE_TRANSFORM if texture.GetTransform() else 0), (rtv.TEXTURE_CUBE_MAP if texture.GetCubeMap() else 0)
-    return rtv.TEXTURE | transform | cube
+    of = ((texture.GetTransform(), rtv.TEXTURE_TRANSFORM), (texture.GetCubeMap(), rtv.TEXTURE_CUBE_MAP), (texture.GetMipmap(), rtv.TEXTURE_MIPMAP))
+    return rtv.TEXTURE | sum(bit for has, bit in of if has)
 
 
-def actor_facts(actor, mapper):
+# What blocks may have of their own since VTK 9.3, which is not followed.
+_OF_BLOCKS = (
+    "ScalarVisibilities", "UseLookupTableScalarRanges", "InterpolateScalarsBeforeMappings", "ColorModes", "ScalarModes", "ArrayAccessModes",
+    "ArrayComponents", "ArrayIds", "ArrayNames", "ScalarRanges", "LookupTables", "FieldDataTupleIds", "Textures")
+
+
+def _has_scalars_of_blocks(mapper):
+    attributes = mapper.GetCompositeDataDisplayAttributes() if hasattr(mapper, "GetCompositeDataDisplayAttributes") else None
+    return attributes is not None and any(getattr(attributes, "HasBlock" + what, bool)() for what in _OF_BLOCKS)
+
+
+def _has_polygon_offset(mapper):
+    factor, units = reference(0.0), reference(0.0)
+    if mapper.GetResolveCoincidentTopology() == _POLYGON_OFFSET:
+        mapper.GetCoincidentTopologyPolygonOffsetParameters(factor, units)
+    return bool(factor != 0 or units != 0)
+
+
+def actor_facts(renderer, actor, mapper):
     f = rtv.ActorFacts()
     # Classes derived in Python (PyVista's) have the names of their VTK base classes.
     f.actor_class, f.mapper_class = actor.GetClassName().encode(), mapper.GetClassName().encode()
@@ -44,6 +63,11 @@ def actor_facts(actor, mapper):
     f.shader_code = bool(shader.HasFragmentShaderCode() or shader.HasVertexShaderCode() or shader.GetNumberOfShaderReplacements() > 0)
     f.glyphs = isinstance(mapper, vtkGlyph3DMapper)
     f.texture, f.num_textures = texture_bits(actor.GetTexture()), p.GetNumberOfTextures()
+    if f.texture and not p.GetShowTexturesOnBackface():
+        f.texture |= rtv.TEXTURE_FRONT_ONLY
+    f.block_scalars = _has_scalars_of_blocks(mapper)
+    f.polygon_offset = _has_polygon_offset(mapper)
+    f.image_lighting = bool(renderer.GetUseImageBasedLighting() and renderer.GetEnvironmentTexture())
     if f.num_textures:
         f.albedo = texture_bits(p.GetTexture("albedoTex"))
         for field, name in MAPS.items():

@@ -2,6 +2,7 @@
 import ctypes as C
 
 import numpy as np
+from vtkmodules.vtkCommonCore import vtkVersion
 from vtkmodules.vtkCommonDataModel import vtkMultiBlockDataSet, vtkPartitionedDataSet, vtkPartitionedDataSetCollection, vtkPolyData
 from vtkmodules.vtkFiltersGeometry import vtkDataSetSurfaceFilter
 from vtkmodules.vtkRenderingCore import vtkActor, vtkGlyph3DMapper, vtkVolume
@@ -14,6 +15,8 @@ from .shape import Shapes
 from .volumes import Volumes
 
 FLAT, PBR = 0, 3
+# Colours of points and cells replace those of blocks; before VTK 9.4 it was the reverse.
+_SCALARS_OVER_BLOCKS = (vtkVersion.GetVTKMajorVersion(), vtkVersion.GetVTKMinorVersion()) >= (9, 4)
 
 
 def _property(p):
@@ -41,7 +44,7 @@ class Extractor:
         # Surfaces of plain actors with the modification times of their inputs, by actor.
         self._plain = {}
         self._shapes, self._textures, self._glyphs, self._volumes = Shapes(), arrays.Textures(), Glyphs(), Volumes()
-        self._radii = 0.0, 0.0
+        self._radii, self._image_lighting = (0.0, 0.0), False
         self._used = set()
 
     def begin_frame(self):
@@ -69,9 +72,10 @@ class Extractor:
                 self._bridge.warn(f"{name}: {reason}; OpenGL draws it")
                 raise
         mapper = prop.GetMapper() if isinstance(prop, vtkActor) else None
+        self._image_lighting = renderer.GetUseImageBasedLighting()
         if mapper is not None and self._add_again(prop, mapper, name):
             return
-        facts = prop_facts(prop) if mapper is None else actor_facts(prop, mapper)
+        facts = prop_facts(prop) if mapper is None else actor_facts(renderer, prop, mapper)
         # Refuses everything without a mapper.
         require(self._bridge.check_actor, facts)
         connected = mapper.GetNumberOfInputConnections(0) > 0
@@ -144,7 +148,7 @@ class Extractor:
         if data is None or actor.GetTexture() is not None or actor.GetBackfaceProperty() is not None:
             return None
         parts = mapper, data, actor.GetProperty(), actor.GetShaderProperty()
-        return self._radii, *((part.__this__, part.GetMTime()) for part in parts)
+        return self._radii, self._image_lighting, *((part.__this__, part.GetMTime()) for part in parts)
 
     def _surface_of(self, mapper, data):
         """The surface of a data set that is not polygonal, made with the cached filter of its mapper."""
@@ -197,11 +201,16 @@ class Extractor:
         back = actor.GetBackfaceProperty()
         if back is not None:
             _add_back(s, _property(back))
+            if state["color"]:
+                # A block's colour is that of both sides.
+                for field in ("ambient_color", "diffuse_color"):
+                    getattr(s.back, field)[:] = state["color"]
+                s.back.ambient, s.back.diffuse = s.property.ambient, s.property.diffuse
         s.point_radius, s.line_radius = self._radii
         s.edges_only = representation == rtv.WIREFRAME
         planes = _planes(mapper, matrix)
         cell_map = self._shapes.add(s, data, representation == rtv.POINTS, planes, keep)
-        if not state["color"]:
+        if not state["color"] or _SCALARS_OVER_BLOCKS:
             arrays.add_colors(self._bridge, s, mapper, data, cell_map, keep)
         if s.color_source != rtv.COLOR_PROPERTY:
             # Colours of points and cells are visible on both sides.

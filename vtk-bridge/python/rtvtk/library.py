@@ -4,7 +4,7 @@ import os
 
 import numpy as np
 
-ABI = 2129185655
+ABI = 1734564159
 #: The first VTK whose renderers Python can replace.
 OLDEST_VTK = (9, 4)
 NONE, U8, F32, F64, I32, I64 = range(6)
@@ -12,7 +12,7 @@ COLOR_PROPERTY, COLOR_POINTS, COLOR_CELLS, COLOR_MAPPED = range(4)
 LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SPOT = range(3)
 POINTS, WIREFRAME, SURFACE = range(3)
 CHOICE_RAYS, CHOICE_OPENGL, CHOICE_ASK_AGAIN = range(3)
-TEXTURE, TEXTURE_TRANSFORM, TEXTURE_CUBE_MAP = 1, 2, 4
+TEXTURE, TEXTURE_TRANSFORM, TEXTURE_CUBE_MAP, TEXTURE_MIPMAP, TEXTURE_FRONT_ONLY = 1, 2, 4, 8, 16
 _KINDS = {np.dtype(np.uint8): U8, np.dtype(np.float32): F32, np.dtype(np.float64): F64, np.dtype(np.int32): I32, np.dtype(np.int64): I64}
 
 
@@ -104,7 +104,8 @@ class ActorFacts(C.Structure):
     _fields_ += [(n, C.c_double) for n in ("back_opacity", "edge_opacity", "coat_strength", "anisotropy", "metallic")]
     _fields_ += [("edge_tint", C.c_double * 3)]
     _fields_ += [(n, C.c_uint32) for n in (
-        "shader_code", "glyphs", "texture", "num_textures", "albedo", "material", "normal", "emissive", "no_data", "reserved")]
+        "shader_code", "glyphs", "texture", "num_textures", "albedo", "material", "normal", "emissive", "no_data", "block_scalars",
+        "polygon_offset", "image_lighting")]
 
 
 class SceneFacts(C.Structure):

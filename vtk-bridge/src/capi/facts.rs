@@ -17,6 +17,10 @@ pub const RTV_TEXTURE: u32 = 1;
 pub const RTV_TEXTURE_TRANSFORM: u32 = 2;
 /// It is a cube map.
 pub const RTV_TEXTURE_CUBE_MAP: u32 = 4;
+/// It has mipmaps.
+pub const RTV_TEXTURE_MIPMAP: u32 = 8;
+/// Back faces do not show it.
+pub const RTV_TEXTURE_FRONT_ONLY: u32 = 16;
 
 /// A prop with its property and mapper. Asked about before the mapper is updated, and again if it
 /// then has no data.
@@ -73,8 +77,12 @@ pub struct RtvActorFacts {
     pub emissive: u32,
     /// 1 if the mapper was updated and has no data.
     pub no_data: u32,
-    /// Not used.
-    pub reserved: u32,
+    /// 1 if blocks have scalars, colour maps or textures of their own.
+    pub block_scalars: u32,
+    /// 1 if OpenGL moves the depths of its polygons, for lines and surfaces in the same plane.
+    pub polygon_offset: u32,
+    /// 1 if an image lights the renderer's physically based surfaces.
+    pub image_lighting: u32,
 }
 
 /// The data of an actor, or one of their blocks, and its surface. Asked about when the cells are

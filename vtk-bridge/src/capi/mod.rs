@@ -33,7 +33,12 @@ pub struct RtvBridge {
 
 /// Version of this interface, computed from its structures and calls (a test gives the value). A
 /// shim built for another version must not continue.
-pub const RTV_ABI: u32 = 2_129_185_655;
+pub const RTV_ABI: u32 = 1_734_564_159;
+
+/// Warning about traced polygons whose depths OpenGL would move.
+const POLYGON_OFFSET: &str = "polygon offsets (SetResolveCoincidentTopologyToPolygonOffset) are not \
+                              followed: of surfaces and lines in one plane, others than in OpenGL's \
+                              image may be in front";
 
 /// [`RTV_ABI`] of the library.
 #[unsafe(no_mangle)]
@@ -282,7 +287,11 @@ pub unsafe extern "C" fn rtv_check_actor(
     unsafe {
         with(bridge, c"internal error".as_ptr(), |h| {
             let (actor, mapper) = (text(f.actor_class), text(f.mapper_class));
-            h.reason(eligibility::actor(f, &actor, &mapper, h.radii()))
+            let reason = eligibility::actor(f, &actor, &mapper, h.radii());
+            if reason.is_none() && f.polygon_offset != 0 {
+                h.bridge.warn(POLYGON_OFFSET.into());
+            }
+            h.reason(reason)
         })
     }
 }

@@ -180,6 +180,7 @@ scripts! {
     data_that_changes_is_drawn_as_it_is_now: "changing",
     clipping_planes_cut_as_in_stock_vtk: "clipping",
     colors_of_points_cells_and_fields_are_stock: "colors",
+    properties_that_meet_are_as_in_stock_vtk: "combinations",
     contours_are_as_in_stock_vtk: "contours",
     data_sets_of_other_kinds_are_as_in_stock_vtk: "data_sets",
     domains_of_any_size_and_place_show_the_same_picture_as_stock: "domains",

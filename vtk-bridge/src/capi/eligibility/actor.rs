@@ -1,8 +1,8 @@
 //! Actors: their classes, representation, property and textures.
 
 use super::super::facts::{
-    RTV_POINTS, RTV_SURFACE, RTV_TEXTURE, RTV_TEXTURE_CUBE_MAP, RTV_TEXTURE_TRANSFORM,
-    RTV_WIREFRAME, RtvActorFacts,
+    RTV_POINTS, RTV_SURFACE, RTV_TEXTURE, RTV_TEXTURE_CUBE_MAP, RTV_TEXTURE_FRONT_ONLY,
+    RTV_TEXTURE_MIPMAP, RTV_TEXTURE_TRANSFORM, RTV_WIREFRAME, RtvActorFacts,
 };
 use super::{Radii, first};
 
@@ -56,6 +56,7 @@ pub(in crate::capi) fn actor(
             "translucent backs with a property of their own",
         ),
         (back && f.glyphs != 0, "glyphs whose backs have a property of their own"),
+        (pbr && f.image_lighting != 0, "a physically based surface that an image lights"),
         (pbr && (f.coat_strength > 0.0 || f.anisotropy != 0.0), "a clear coat or anisotropy"),
         (pbr && f.metallic > 0.0 && f.edge_tint != [1.0; 3], "a metal with an edge tint"),
         (
@@ -72,6 +73,7 @@ pub(in crate::capi) fn actor(
     .or_else(|| {
         first(&[
             (!MAPPERS.contains(&mapper_class), "OpenGL draws mappers of this class"),
+            (f.block_scalars != 0, "blocks with scalars, colour maps or textures of their own"),
             (f.no_data != 0, "no data"),
         ])
     })
@@ -83,5 +85,7 @@ fn texture(bits: u32) -> Option<&'static str> {
     first(&[
         (has(RTV_TEXTURE_TRANSFORM), "a texture with a transform"),
         (has(RTV_TEXTURE_CUBE_MAP), "a cube map"),
+        (has(RTV_TEXTURE_MIPMAP), "a texture with mipmaps"),
+        (has(RTV_TEXTURE_FRONT_ONLY), "a texture that back faces do not show"),
     ])
 }

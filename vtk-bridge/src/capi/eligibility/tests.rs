@@ -37,7 +37,9 @@ const ACTOR: RtvActorFacts = RtvActorFacts {
     normal: 0,
     emissive: 0,
     no_data: 0,
-    reserved: 0,
+    block_scalars: 0,
+    polygon_offset: 0,
+    image_lighting: 0,
 };
 
 const SURFACE: RtvSurfaceFacts = RtvSurfaceFacts {
@@ -172,6 +174,10 @@ fn actor_rows(r: &mut Rows) {
     r.actor(|f| (f.has_back, f.back_opacity) = (1, 0.5), translucent_back);
     r.actor(|f| (f.has_back, f.translucent) = (1, 1), translucent_back);
     r.actor(|f| (f.has_back, f.glyphs) = (1, 1), "glyphs whose backs have a property of their own");
+    r.actor(
+        |f| (f.pbr, f.image_lighting) = (1, 1),
+        "a physically based surface that an image lights",
+    );
     r.actor(|f| (f.pbr, f.coat_strength) = (1, 0.1), "a clear coat or anisotropy");
     r.actor(|f| (f.pbr, f.anisotropy) = (1, -0.1), "a clear coat or anisotropy");
     r.actor(
@@ -199,6 +205,11 @@ fn actor_rows(r: &mut Rows) {
     r.actor(|f| (f.pbr, f.num_textures, f.emissive) = (1, 1, moved), "a texture with a transform");
     r.actor(|f| f.texture = moved, "a texture with a transform");
     r.actor(|f| f.texture = cube, "a cube map");
+    let smaller = RTV_TEXTURE | RTV_TEXTURE_MIPMAP;
+    r.actor(|f| f.texture = smaller, "a texture with mipmaps");
+    let one_sided = RTV_TEXTURE | RTV_TEXTURE_FRONT_ONLY;
+    r.actor(|f| f.texture = one_sided, "a texture that back faces do not show");
+    r.actor(|f| f.block_scalars = 1, "blocks with scalars, colour maps or textures of their own");
     r.actor(|f| f.shader_code = 1, "shader code of its own");
     r.actor(|f| f.no_data = 1, "no data");
     let with_classes = |actor_class: &str, mapper_class: &str| {
