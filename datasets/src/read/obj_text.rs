@@ -1,9 +1,9 @@
 //! The text of OBJ and MTL files in the form that the crate `tobj` takes.
 //!
 //! `tobj` 4.0.5 expects UTF-8, drops a first line behind a byte order mark, panics at a colour of
-//! one number (`Ks 0`, which the format allows: green and blue are then as red), and refuses a whole
-//! file for a material without a name or one value that is no number. So lines are brought into
-//! order here first. Numbers of lines stay, for messages.
+//! one number (`Ks 0`, which the format allows: green and blue are then as red), and refuses a
+//! whole file for a material without a name or one value that is no number. So lines are brought
+//! into order here first. Numbers of lines stay, for messages.
 
 use std::borrow::Cow;
 
