@@ -3,7 +3,8 @@
 
 use datasets::image_io::{read_exr, read_png};
 use datasets::model::{
-    Attributes, DataArray, Dataset, ImageData, Points, PolyData, StructuredGrid, Values,
+    Attributes, DataArray, Dataset, ImageData, Points, PolyData, StructuredGrid, UnstructuredGrid,
+    Values,
 };
 use datasets::write::{VtkOptions, write_glb, write_obj, write_ply, write_vtk};
 use glam::DVec3;
@@ -417,6 +418,54 @@ fn pieces_of_stl_ply_obj_and_parallel_files_are_stored_one_after_the_other() {
     let said = store(&of("both.pvtp"));
     assert_eq!(said["triangles"], 2560);
     assert!(said["attribute_bytes"].as_u64().unwrap() > 0, "{said}");
+}
+
+#[test]
+fn pieces_of_solid_cells_are_stored_one_by_one_with_the_surface_of_the_whole() {
+    let dir = tempfile::tempdir().unwrap();
+    let of = |name: &str| dir.path().join(name).display().to_string();
+    // Two cubes that share a face, each with a copy of the other where `copies` says so, and then
+    // a piece that has copies alone.
+    let corner = |i: u32| [i % 3, i / 3 % 2, i / 6].map(f64::from);
+    let cube = |x: u32| [0, 1, 4, 3, 6, 7, 10, 9].map(|i| i + x);
+    let write_pieces = |copies: bool| {
+        let of_piece = |own: u32| vec![(own, 0), (1 - own, 1)];
+        let pieces =
+            [("left.vtu", of_piece(0)), ("none.vtu", vec![(0, 1)]), ("right.vtu", of_piece(1))];
+        for (name, mut cells) in pieces {
+            cells.retain(|(_, ghost)| copies || *ghost == 0);
+            let points = (0..12).map(corner).collect();
+            let mut grid =
+                UnstructuredGrid { points: Points::F64(points), ..UnstructuredGrid::default() };
+            for (x, _) in &cells {
+                grid.cells.push(cube(*x));
+                grid.types.push(12);
+            }
+            if copies {
+                let ghost = Values::U8(cells.iter().map(|(_, ghost)| *ghost).collect());
+                grid.attributes.cell.push(DataArray::new("vtkGhostType", 1, ghost));
+            }
+            let grid = Dataset::UnstructuredGrid(grid);
+            write_vtk(dir.path().join(name), &grid, VtkOptions::default()).unwrap();
+        }
+    };
+    let list = r#"<VTKFile type="PUnstructuredGrid"><PUnstructuredGrid><Piece Source="left.vtu"/>
+        <Piece Source="none.vtu"/><Piece Source="right.vtu"/></PUnstructuredGrid></VTKFile>"#;
+    std::fs::write(of("both.pvtu"), list).unwrap();
+    for (copies, triangles, warns) in [(false, 24, true), (true, 20, false)] {
+        write_pieces(copies);
+        let made = bench(&["store", &of("both.pvtu"), "-o", &of("both.rtmesh"), "--json"]);
+        let text = String::from_utf8_lossy(&made.stderr).into_owned();
+        assert!(made.status.success(), "{text}");
+        let said: Value = serde_json::from_slice(&made.stdout).unwrap();
+        assert_eq!(said["triangles"], triangles, "copies: {copies}");
+        assert_eq!(text.contains("2 pieces have no ghost cells"), warns, "{text}");
+        assert_eq!(text.is_empty(), !warns, "{text}");
+    }
+    refused(
+        &["store", &of("both.pvtu"), "-o", &of("both.rtmesh"), "--isovalue", "1"],
+        ["--isovalue", "image data"],
+    );
 }
 
 #[test]

@@ -40,7 +40,7 @@ pub(super) fn render(common: CommonArgs, args: &RenderArgs) -> anyhow::Result<()
         color_by: args.color_by.clone(),
         isovalue: args.isovalue,
         volume,
-        origin: None,
+        ..LoadOptions::default()
     };
     let stored = stored_file::open(args, &load_options)?;
     let cure = if load_options.volume == VolumeChoice::No {

@@ -149,19 +149,26 @@ fn store_file(
                 "{count} faces cross themselves or are too large, and were divided as a fan"
             ));
         }
-    } else if named("pvtp")
+    } else if (named("pvtp") || named("pvtu"))
         && let Some(PieceFiles { files, .. }) = piece_files(file)?
     {
-        // Not of `.pvtu`: the surface of a volume's pieces would have the faces between them.
         let bar = common.progress(files.len() as u64, "storing");
+        let mut without_copies = 0;
         for piece in &files {
             let opened = datasets::read::open(piece)?;
-            // A process without a part of the surface writes a piece without points, and often
+            // A process without a part of the data writes a piece without cells, and often
             // without the arrays of the others.
             if !is_empty(&opened) {
-                job.add_file(piece, &opened, job.origin())?;
+                job.add_piece(piece, &opened)?;
+                without_copies += usize::from(named("pvtu") && !has_ghost_cells(&opened));
             }
             bar.inc(1);
+        }
+        if without_copies > 1 {
+            job.warn_once(format!(
+                "{without_copies} pieces have no ghost cells, so the faces between them are \
+                 stored too; ParaView's filter Ghost Cells adds such cells"
+            ));
         }
     } else {
         let opened = datasets::read::open(file)?;
@@ -173,10 +180,22 @@ fn store_file(
     job.finish(file)
 }
 
-/// Whether a file has no points.
+/// Whether a file has no cells.
 fn is_empty(opened: &LoadedFile) -> bool {
     match &opened.content {
-        Content::Data(data) => data.leaves().iter().all(|leaf| leaf.counts().0 == 0),
+        Content::Data(data) => data.leaves().iter().all(|leaf| leaf.counts().1 == 0),
+        Content::Scene(_) => false,
+    }
+}
+
+/// Whether a piece says which of its cells are copies of another piece's.
+fn has_ghost_cells(opened: &LoadedFile) -> bool {
+    match &opened.content {
+        Content::Data(data) => data
+            .leaves()
+            .iter()
+            .filter_map(|leaf| leaf.attributes())
+            .any(|attributes| attributes.cell_array("vtkGhostType").is_some()),
         Content::Scene(_) => false,
     }
 }

@@ -63,12 +63,28 @@ impl<'a> StoreJob<'a> {
         }
     }
 
-    /// Adds the meshes of a file, or of a piece of it.
+    /// Adds the meshes of a file, relative to `origin` where one is given.
     pub(super) fn add_file(
         &mut self,
         file: &Path,
         opened: &LoadedFile,
         origin: Option<DVec3>,
+    ) -> anyhow::Result<()> {
+        self.add_loaded(file, opened, &LoadOptions { origin, ..LoadOptions::default() })
+    }
+
+    /// Adds the meshes of one of several files, which may have none.
+    pub(super) fn add_piece(&mut self, file: &Path, opened: &LoadedFile) -> anyhow::Result<()> {
+        let options =
+            LoadOptions { origin: self.origin(), without_points: true, ..LoadOptions::default() };
+        self.add_loaded(file, opened, &options)
+    }
+
+    fn add_loaded(
+        &mut self,
+        file: &Path,
+        opened: &LoadedFile,
+        options: &LoadOptions,
     ) -> anyhow::Result<()> {
         let of_image_data =
             [("--array", self.args.array.is_some()), ("--isovalue", self.args.isovalue.is_some())];
@@ -79,8 +95,7 @@ impl<'a> StoreJob<'a> {
             );
             return Err(UsageError(text).into());
         }
-        let options =
-            LoadOptions { color_by: self.args.color_by.clone(), origin, ..LoadOptions::default() };
+        let options = LoadOptions { color_by: self.args.color_by.clone(), ..options.clone() };
         let subject = Subject::from_file(opened, &options)
             .with_context(|| format!("{}: no triangles to store", file.display()))?;
         for warning in subject.warnings {

@@ -119,6 +119,9 @@ pub struct LoadOptions {
     /// What positions of surfaces of data sets are relative to; `None` to choose it. For pieces of
     /// one surface.
     pub origin: Option<DVec3>,
+    /// Whether points of a data set without triangles and lines are left out. A piece that lies
+    /// inside of a volume has no surface, and its points are none of the picture's.
+    pub without_points: bool,
 }
 
 /// Selects the field for volume rendering.
@@ -366,7 +369,7 @@ fn from_data(data: &Dataset, load_options: &LoadOptions) -> anyhow::Result<Subje
     if !lines.is_empty() {
         add_tubes(&mut subject, &lines)?;
     }
-    if subject.parts.is_empty() {
+    if subject.parts.is_empty() && !load_options.without_points {
         add_points(&mut subject, data, color.as_deref())?;
     }
     Ok(subject)
