@@ -36,7 +36,8 @@ fn demo_rejects_impossible_input_and_renders_unusual_input() {
     let known = file("known.obj", &triangle("0 0 0"));
     let missing = folder.join("missing.vtp").to_str().expect("a path in UTF-8").to_owned();
     for (arguments, words) in [
-        (vec!["-n", "3", "--data", &file("empty.obj", "")], "holds no triangle"),
+        (vec!["-n", "3", "--data", &file("empty.obj", "")], "no vertices and no faces"),
+        (vec!["-n", "3", "--data", &file("corner.obj", "v 1 2 3\n")], "holds no triangle"),
         (vec!["--data", &missing], "there is no file"),
         (vec!["--data", "wavelett"], "there are: wavelet"),
         (vec!["--data", &known, "--view", "inside"], "has no view `inside`"),
