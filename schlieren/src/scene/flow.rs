@@ -286,8 +286,8 @@ impl FlowSpec {
             "temperature" => {
                 let Some(pressure) = text(&self.pressure) else {
                     return Err(wrong(
-                        "flow.temperature needs flow.pressure: an array, or one value in Pa for the \
-                         whole field, such as 101325"
+                        "flow.temperature needs flow.pressure: an array, or one value in Pa for \
+                         the whole field, such as 101325"
                             .into(),
                     ));
                 };

@@ -36,9 +36,9 @@ pub struct RtvBridge {
 pub const RTV_ABI: u32 = 1_734_564_159;
 
 /// Warning about traced polygons whose depths OpenGL would move.
-const POLYGON_OFFSET: &str = "polygon offsets (SetResolveCoincidentTopologyToPolygonOffset) are not \
-                              followed: of surfaces and lines in one plane, others than in OpenGL's \
-                              image may be in front";
+const POLYGON_OFFSET: &str = "polygon offsets (SetResolveCoincidentTopologyToPolygonOffset) are \
+                              not followed: of surfaces and lines in one plane, others than in \
+                              OpenGL's image may be in front";
 
 /// [`RTV_ABI`] of the library.
 #[unsafe(no_mangle)]
