@@ -94,6 +94,7 @@ pub struct Camera {
     pub(crate) projection: Projection,
     depth_range: [f64; 2],
     lens: Option<ThinLens>,
+    viewer: Option<DVec3>,
     pub(crate) near_far_clipping: bool,
 }
 
@@ -144,6 +145,7 @@ impl Camera {
             projection,
             depth_range: [0.0, 1.0],
             lens: None,
+            viewer: None,
             near_far_clipping: true,
         })
     }
@@ -267,11 +269,28 @@ impl Camera {
         Camera { depth_range, ..self }
     }
 
+    /// The same camera with the viewer at a world position, for the light that surfaces reflect
+    /// towards it: highlights, and lights that the viewer carries. Without one, that is where each
+    /// ray comes from. Rasterizers put a viewer into parallel projections too: OpenGL with
+    /// `GL_LIGHT_MODEL_LOCAL_VIEWER` (OpenGL 2.1, section 2.14.1), VTK always. Mirrors and glass
+    /// keep to the rays.
+    pub fn with_viewer(self, viewer: Option<DVec3>) -> Camera {
+        Camera { viewer, ..self }
+    }
+
+    /// The viewer's position, if the camera was [given one](Self::with_viewer).
+    pub fn viewer(&self) -> Option<DVec3> {
+        self.viewer
+    }
+
     /// Checks the values whose setters do not check them.
     pub(crate) fn check(&self) -> Result<(), CameraError> {
         let ends = self.depth_range;
         for (field, end) in [("depth_range[0]", ends[0]), ("depth_range[1]", ends[1])] {
             in_range(field, end, end.is_finite(), "finite (OpenGL's are 0 to 1)")?;
+        }
+        for v in self.viewer.iter().flat_map(|v| v.to_array()) {
+            in_range("viewer", v, v.is_finite(), "finite in every component")?;
         }
         Ok(())
     }

@@ -66,7 +66,7 @@ pub(crate) fn add_ambient_light(
         for (i, p) in points[start..end].iter().enumerate() {
             if in_blocks && i % LANES == 0 {
                 let block = &points[start + i..end.min(start + i + LANES)];
-                let at = PointBlock::gather(block);
+                let at = PointBlock::gather(block, context.viewer);
                 dispatch!(
                     context.level,
                     simd => ambient_block(simd, context, mean, &at, &mut light)

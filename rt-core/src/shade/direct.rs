@@ -112,7 +112,7 @@ pub(super) fn direct_lighting<M: Maps>(
                     model,
                     normal,
                     color,
-                    p.view,
+                    p.towards_viewer(context.viewer),
                     incident.dir,
                     light.color,
                     light.highlight,
@@ -161,7 +161,7 @@ fn light_block(
     rays: &mut LightRays,
 ) {
     let from_light = traced.then(|| !context.light_passes_surfaces());
-    let at = PointBlock::gather(points);
+    let at = PointBlock::gather(points, context.viewer);
     dispatch!(
         context.level,
         simd => block.fill(simd, context, light, &at, from_light, SHADOW_ERRORS)

@@ -43,6 +43,8 @@ pub(crate) struct FrameContext<'a> {
     pub(crate) transmissive: Vec<bool>,
     /// Volumes with the transform into their object space.
     pub(crate) volumes: Vec<(&'a Volume, DAffine3)>,
+    /// [`Camera::viewer`] in render space.
+    pub(crate) viewer: Option<Vec3>,
     /// World position of render space's origin.
     pub(crate) origin: DVec3,
     /// Render-space up of the image, for gradient backgrounds seen in mirrors.
@@ -118,6 +120,7 @@ impl<'a> FrameContext<'a> {
             },
             has_maps: scene.materials.iter().any(|m| m.maps.is_some()),
             volumes,
+            viewer: camera.viewer().map(|v| (v - origin).as_vec3()),
             origin,
             up: world_from_view.y_axis.as_vec3(),
         }

@@ -387,6 +387,7 @@ fn process_hits_with<M: Maps>(
         p.lane = i as u32;
         p.instance = hit.instance;
         p.lit = lit;
+        p.before_camera = state.kind == RayKind::Camera;
         p.parameters = parameters.map_or(NO_PARAMETERS, |v| {
             work.parameters.push(v);
             work.parameters.len() as u32 - 1

@@ -20,6 +20,8 @@ pub(crate) struct Point {
     pub(crate) instance: u32,
     /// False where lights change nothing.
     pub(crate) lit: bool,
+    /// Whether the camera sees it, also through translucent layers, and not a mirror or glass.
+    pub(super) before_camera: bool,
     /// Index into [`super::Workspace`]'s list, or [`NO_PARAMETERS`].
     pub(super) parameters: u32,
 }
@@ -65,8 +67,19 @@ impl Point {
         lane: 0,
         instance: 0,
         lit: false,
+        before_camera: false,
         parameters: NO_PARAMETERS,
     };
+
+    /// Unit, the direction in which lights are seen reflected: [`Point::view`] unless the camera
+    /// has a [viewer](crate::camera::Camera::with_viewer).
+    #[inline(always)]
+    pub(super) fn towards_viewer(&self, viewer: Option<Vec3>) -> Vec3 {
+        match viewer.filter(|_| self.before_camera) {
+            Some(viewer) => (viewer - self.surface.point).normalize_or_zero(),
+            None => self.view,
+        }
+    }
 
     /// The surface parameters of this point, where they differ from the material.
     #[inline(always)]

@@ -6,6 +6,7 @@ use super::surfaces::BlockSurfaces;
 use crate::material::Material;
 use crate::ray::{HitBlock, LANES, RayBlock};
 use crate::simd::vectors::{Row, Rows3};
+use glam::Vec3;
 
 /// What light at a point depends on.
 #[derive(Clone)]
@@ -15,6 +16,7 @@ pub(super) struct PointBlock {
     pub(super) face_normal: Rows3,
     pub(super) normal: Rows3,
     pub(super) color: Rows3,
+    /// [`Point::towards_viewer`].
     pub(super) view: Rows3,
     pub(super) point_error: Row,
     /// Numbers of the instances that the points are on.
@@ -36,21 +38,28 @@ impl PointBlock {
         lit: 0,
     };
 
-    /// The surfaces that the rays of a block have met in the lanes `lit`.
+    /// The surfaces that the camera rays of a block have met in the lanes `lit`.
     #[inline(always)]
     pub(super) fn of_surfaces(
         surfaces: &BlockSurfaces,
         rays: &RayBlock,
         hits: &HitBlock,
         lit: u16,
+        viewer: Option<Vec3>,
     ) -> PointBlock {
+        let (shading, exact) = surfaces.rows();
         let mut view = Rows3([rays.dx, rays.dy, rays.dz]);
-        for row in &mut view.0 {
+        if let Some(viewer) = viewer {
             for lane in 0..LANES {
-                row[lane] *= surfaces.to_view[lane];
+                view.set(lane, (viewer - exact.point.get(lane)).normalize_or_zero());
+            }
+        } else {
+            for row in &mut view.0 {
+                for lane in 0..LANES {
+                    row[lane] *= surfaces.to_view[lane];
+                }
             }
         }
-        let (shading, exact) = surfaces.rows();
         PointBlock {
             point: exact.point,
             face_normal: exact.face_normal,
@@ -65,7 +74,7 @@ impl PointBlock {
 
     /// One to sixteen points. The lanes after them repeat the first one.
     #[inline(always)]
-    pub(super) fn gather(points: &[Point]) -> PointBlock {
+    pub(super) fn gather(points: &[Point], viewer: Option<Vec3>) -> PointBlock {
         let mut b = PointBlock::NONE;
         for lane in 0..LANES {
             let p = points.get(lane).unwrap_or(&points[0]);
@@ -73,7 +82,7 @@ impl PointBlock {
             b.face_normal.set(lane, p.surface.face_normal);
             b.normal.set(lane, p.surface.normal);
             b.color.set(lane, p.surface.color);
-            b.view.set(lane, p.view);
+            b.view.set(lane, p.towards_viewer(viewer));
             b.point_error[lane] = p.surface.point_error;
             b.instance[lane] = p.instance;
             b.lit |= ((p.lit && lane < points.len()) as u16) << lane;

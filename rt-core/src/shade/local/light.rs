@@ -10,7 +10,7 @@ use crate::surface::ShadingPointBlock;
 use fearless_simd::{Select, Simd, SimdBase, f32x16, mask32x16};
 use glam::Vec3;
 
-/// Radiance towards the rays' origins.
+/// Radiance towards the viewer, or the rays' origins.
 #[inline(never)]
 pub(super) fn radiance_block<S: Simd>(
     simd: S,
@@ -45,8 +45,14 @@ fn body<S: Simd>(
     let normal = Vec3x16::load(simd, &shading_points.normal);
     let dir = Vec3x16::load_rows(simd, [&rays.dx, &rays.dy, &rays.dz]);
     let zero = Vec3x16::splat(simd, Vec3::ZERO);
-    let (unit, ok) = dir.try_normalize(simd);
-    let view = unit.or_else(ok, zero).neg();
+    let towards = match context.viewer {
+        Some(viewer) => {
+            Vec3x16::splat(simd, viewer).sub(Vec3x16::load(simd, &shading_points.point))
+        }
+        None => dir.neg(),
+    };
+    let (unit, ok) = towards.try_normalize(simd);
+    let view = unit.or_else(ok, zero);
 
     for light in &context.lights {
         let (l, strength) = incident(simd, light, &shading_points.point);

@@ -97,7 +97,7 @@ pub(super) fn light(
 ) {
     let has_place =
         |l: &crate::light::ResolvedLight| !matches!(l.kind, ResolvedLightKind::Directional { .. });
-    let points = context.lights.iter().any(has_place);
+    let points = context.viewer.is_some() || context.lights.iter().any(has_place);
     dispatch!(context.level, simd => {
         if points {
             light_hits::<_, WithPoint>(simd, context, area, out, work, pixels, record, stats);
@@ -202,7 +202,8 @@ fn fill_background(
     }
 }
 
-/// Radiance of one surface towards the origin of a ray with direction `dir`: the scalar form of
+/// Radiance of one surface towards the viewer, or the origin of a ray with direction `dir`: the
+/// scalar form of
 /// [`light::radiance_block`].
 fn radiance(
     context: &FrameContext<'_>,
@@ -217,10 +218,10 @@ fn radiance(
     if *model == SurfaceModel::Unlit {
         return radiance + shading_point.color;
     }
-    let view = -dir.normalize_or_zero();
-    let ShadingPoint { normal, color, .. } = *shading_point;
+    let ShadingPoint { point, normal, color, .. } = *shading_point;
+    let view = context.viewer.map_or(-dir, |viewer| viewer - point).normalize_or_zero();
     for light in &context.lights {
-        let incident = incident_from(light, shading_point.point, None);
+        let incident = incident_from(light, point, None);
         let answer =
             response(model, normal, color, view, incident.dir, light.color, light.highlight);
         radiance += answer * (arriving * incident.strength);

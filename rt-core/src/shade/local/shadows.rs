@@ -104,7 +104,7 @@ impl ShadowBuffers {
                 let pale = shading.opacity[lane] < OPAQUE;
                 stats.opacity_ignored += (pale && hit >> lane & 1 != 0) as u64;
             }
-            self.points[b] = PointBlock::of_surfaces(&surfaces, rays, hits, hit);
+            self.points[b] = PointBlock::of_surfaces(&surfaces, rays, hits, hit, context.viewer);
             let (at, radiance) = (&mut self.points[b], &mut self.radiance[b]);
             let instances = at.instance;
             by_material(context, &instances, hit, |material, lanes| {
