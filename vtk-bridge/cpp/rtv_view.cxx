@@ -51,6 +51,12 @@ RtvView rtvView(vtkRenderer* renderer, int width, int height)
   vtkMatrix4x4::Multiply4x4(camera->GetProjectionTransformMatrix(renderer->GetTiledAspectRatio(), -1.0, 1.0),
     camera->GetModelViewTransformMatrix(), matrix);
   std::copy(&matrix->Element[0][0], &matrix->Element[0][0] + 16, view.clip_from_world);
+  view.has_viewer = 1;
+  vtkMatrix4x4::Invert(camera->GetModelViewTransformMatrix(), matrix);
+  for (int c = 0; c < 3; ++c)
+  {
+    view.viewer[c] = matrix->GetElement(c, 3);
+  }
   double bottom[3], top[3];
   renderer->GetBackground(bottom);
   renderer->GetBackground2(top);

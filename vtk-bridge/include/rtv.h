@@ -297,6 +297,8 @@ typedef struct RtvLight {
 typedef struct RtvView {
   /* Projection times view, row by row, depth -1 to 1. */
   double clip_from_world[16];
+  /* World position of the camera, with has_viewer. */
+  double viewer[3];
   /* Background at the bottom. */
   float background_bottom[3];
   /* Background at the top. */
@@ -315,6 +317,8 @@ typedef struct RtvView {
   uint32_t window_samples;
   /* 1 when OpenGL draws nothing beside the image that is translucent or has a depth. */
   uint32_t one_layer;
+  /* 1: parallel projections see highlights and lights at the viewer by lines from viewer, as OpenGL's shaders do, not by the rays. */
+  uint32_t has_viewer;
 } RtvView;
 /* An image; rows start at the top, and the memory belongs to the bridge until its next call. */
 typedef struct RtvPicture {
@@ -590,7 +594,7 @@ typedef struct RtvSceneVolume {
   double world_from_unit[16];
 } RtvSceneVolume;
 /* Version of this interface, computed from its structures and calls (a test gives the value). A shim built for another version must not continue. */
-#define RTV_ABI 1734564159u
+#define RTV_ABI 3395303342u
 /* All calls in one table, so that a shim needs only one symbol. */
 typedef struct RtvApi {
   /* rtv_abi. */

@@ -485,6 +485,9 @@ impl Bridge {
 
     fn camera(&mut self, view: &View, options: &Options) -> Result<Camera, BridgeError> {
         let camera = Camera::from_matrix(view.clip_from_world)?;
+        // Elsewhere it is where the rays come from.
+        let viewer = view.viewer.filter(|_| camera.eye().is_none());
+        let camera = camera.with_viewer(viewer);
         let focus = options.focus.or(view.lens.map(|l| l.focus_distance));
         let aperture = if options.aperture > 0.0 { options.aperture } else { 0.0 };
         let Some(focus_distance) = focus.filter(|_| aperture > 0.0) else { return Ok(camera) };

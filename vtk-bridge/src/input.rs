@@ -498,6 +498,9 @@ pub struct Lens {
 pub struct View {
     /// OpenGL's projection · view, depth -1..1.
     pub clip_from_world: DMat4,
+    /// World position of the camera: in parallel projections, highlights and lights at the viewer
+    /// are seen from it, as in OpenGL's shaders. `None`: along the rays.
+    pub viewer: Option<DVec3>,
     /// Pixels per row.
     pub width: u32,
     /// Number of rows.

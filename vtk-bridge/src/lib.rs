@@ -26,6 +26,7 @@
 //! });
 //! let view = View {
 //!     clip_from_world: DMat4::IDENTITY,
+//!     viewer: None,
 //!     width: 8,
 //!     height: 8,
 //!     background: [[0.0; 3]; 2],

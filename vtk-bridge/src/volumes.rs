@@ -458,6 +458,7 @@ mod tests {
         };
         let view = View {
             clip_from_world,
+            viewer: None,
             width: 3,
             height: 3,
             background: [[0.0; 3]; 2],

@@ -320,6 +320,7 @@ mod tests {
         });
         let view = View {
             clip_from_world: DMat4::IDENTITY,
+            viewer: None,
             width: 150,
             height: 130,
             background: [[0.0; 3]; 2],

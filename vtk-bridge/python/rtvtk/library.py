@@ -4,7 +4,7 @@ import os
 
 import numpy as np
 
-ABI = 1734564159
+ABI = 3395303342
 #: The first VTK whose renderers Python can replace.
 OLDEST_VTK = (9, 4)
 NONE, U8, F32, F64, I32, I64 = range(6)
@@ -84,9 +84,10 @@ class Light(C.Structure):
 
 class View(C.Structure):
     _fields_ = [
-        ("clip_from_world", C.c_double * 16), ("background_bottom", C.c_float * 3), ("background_top", C.c_float * 3),
+        ("clip_from_world", C.c_double * 16), ("viewer", C.c_double * 3),
+        ("background_bottom", C.c_float * 3), ("background_top", C.c_float * 3),
         ("focus_distance", C.c_double), ("width", C.c_uint32), ("height", C.c_uint32), ("interactive", C.c_uint32), ("shadows", C.c_uint32),
-        ("window_samples", C.c_uint32), ("one_layer", C.c_uint32),
+        ("window_samples", C.c_uint32), ("one_layer", C.c_uint32), ("has_viewer", C.c_uint32),
     ]
 
 

@@ -59,6 +59,9 @@ def view_of(renderer, width, height):
     projection = camera.GetProjectionTransformMatrix(renderer.GetTiledAspectRatio(), -1.0, 1.0)
     vtkMatrix4x4.Multiply4x4(projection, camera.GetModelViewTransformMatrix(), matrix)
     out.clip_from_world[:] = matrix.GetData()
+    matrix.DeepCopy(camera.GetModelViewTransformMatrix())
+    matrix.Invert()
+    out.has_viewer, out.viewer[:] = 1, [matrix.GetElement(i, 3) for i in range(3)]
     out.background_bottom[:] = renderer.GetBackground()
     out.background_top[:] = renderer.GetBackground2() if renderer.GetGradientBackground() else renderer.GetBackground()
     out.focus_distance = camera.GetDistance()

@@ -20,7 +20,7 @@ pub use types::*;
 use crate::bridge::AddOutcome;
 use crate::input::View;
 use crate::options::Options;
-use rt_core::glam::DMat4;
+use rt_core::glam::{DMat4, DVec3};
 pub(crate) use state::guarded;
 use state::{BridgeState, set_option, with};
 use std::ffi::CStr;
@@ -33,7 +33,7 @@ pub struct RtvBridge {
 
 /// Version of this interface, computed from its structures and calls (a test gives the value). A
 /// shim built for another version must not continue.
-pub const RTV_ABI: u32 = 1_734_564_159;
+pub const RTV_ABI: u32 = 3_395_303_342;
 
 /// Warning about traced polygons whose depths OpenGL would move.
 const POLYGON_OFFSET: &str = "polygon offsets (SetResolveCoincidentTopologyToPolygonOffset) are \
@@ -398,6 +398,7 @@ pub unsafe extern "C" fn rtv_render(
     let (Some(v), false) = (unsafe { view.as_ref() }, picture.is_null()) else { return 0 };
     let view = View {
         clip_from_world: DMat4::from_cols_array(&v.clip_from_world).transpose(),
+        viewer: (v.has_viewer != 0).then(|| DVec3::from_array(v.viewer)),
         width: v.width,
         height: v.height,
         background: [v.background_bottom, v.background_top],

@@ -87,6 +87,8 @@ fn surface(points: &[[f32; 3]], offsets: &[[i64; 1]], connectivity: &[[i64; 1]])
 fn view() -> RtvView {
     RtvView {
         clip_from_world: IDENTITY,
+        viewer: [0.0; 3],
+        has_viewer: 0,
         background_bottom: [0.0; 3],
         background_top: [0.0; 3],
         focus_distance: 1.0,

@@ -328,6 +328,8 @@ pub struct RtvLight {
 pub struct RtvView {
     /// Projection times view, row by row, depth -1 to 1.
     pub clip_from_world: [f64; 16],
+    /// World position of the camera, with has_viewer.
+    pub viewer: [f64; 3],
     /// Background at the bottom.
     pub background_bottom: [f32; 3],
     /// Background at the top.
@@ -347,6 +349,9 @@ pub struct RtvView {
     pub window_samples: u32,
     /// 1 when OpenGL draws nothing beside the image that is translucent or has a depth.
     pub one_layer: u32,
+    /// 1: parallel projections see highlights and lights at the viewer by lines from viewer, as
+    /// OpenGL's shaders do, not by the rays.
+    pub has_viewer: u32,
 }
 
 /// An image; rows start at the top, and the memory belongs to the bridge until its next call.

@@ -192,6 +192,7 @@ scripts! {
     blocks_have_their_own_color_opacity_and_visibility: "multiblock",
     odd_inputs_are_survived: "odd_inputs",
     opacity_is_as_with_depth_peeling: "opacity",
+    highlights_of_parallel_projections_are_as_in_stock_vtk: "parallel_lights",
     physically_based_surfaces_are_as_in_stock_vtk: "pbr",
     textures_of_physically_based_surfaces_are_as_in_stock_vtk: "pbr_maps",
     coefficients_scalars_lines_and_smooth_metals_are_lit_as_by_vtks_shader_of_this_version: "pbr_terms",
