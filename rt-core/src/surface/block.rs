@@ -6,9 +6,10 @@
 //! on all lanes, with the same bits. Lanes that need f64 (tiny or huge triangles, normals that
 //! cannot be normalised) are left to `shading_point` itself.
 
+use super::triangle_rows::TriangleRows;
 use super::{HitPoint, ORDINARY_NORMAL_SQUARED, ResolvedInstance, ShadingPoint, Source, plane_of};
-use crate::material::{ColorSource, ColorTransfer, Sides};
-use crate::mesh::{Attribute, PerElement, TriMesh};
+use crate::bvh::traverse::block_hits::set_bits;
+use crate::material::{ColorSource, Sides};
 use crate::ray::{HitBlock, LANES, RayBlock};
 use crate::simd::prefetch_item;
 use crate::simd::vectors::{Row, Rows3, Vec3x16};
@@ -86,9 +87,6 @@ impl Planes {
     }
 }
 
-/// Vertex indices of sixteen triangles, one row per corner.
-type Corners = [[u32; LANES]; 3];
-
 impl ResolvedInstance<'_> {
     /// Prefetches the vertex indices of triangle `prim`.
     #[inline]
@@ -127,10 +125,14 @@ impl ResolvedInstance<'_> {
         hits: &HitBlock,
         out: &mut ShadingPointBlock,
     ) {
-        let done = match self.source {
-            Source::Mesh(mesh) => self.mesh_block::<S, P>(simd, mesh, lanes, rays, hits, out),
-            Source::Shape(_) => 0,
+        let mut triangles = TriangleRows::new();
+        let found = self.triangle_rows(simd, lanes, rays, hits, &mut triangles);
+        let done = if found == 0 {
+            0
+        } else {
+            self.triangle_block::<S, P>(simd, &triangles, rays, hits, out)
         };
+        let done = done & found;
         let mut left = lanes & !done;
         while left != 0 {
             let lane = left.trailing_zeros() as usize;
@@ -152,11 +154,12 @@ impl ResolvedInstance<'_> {
         origin: DVec3,
         out: &mut Planes,
     ) {
-        if let Source::Mesh(mesh) = self.source {
-            self.mesh_planes(simd, mesh, lanes, hits, origin, out);
-            return;
+        let mut corners = [Rows3::ZERO; 3];
+        let found = self.corner_rows(lanes, rays, hits, &mut corners);
+        if found != 0 {
+            self.triangle_planes(simd, &corners, found, hits, origin, out);
         }
-        for lane in (0..LANES).filter(|l| lanes >> l & 1 != 0) {
+        for lane in set_bits(lanes & !found) {
             if let Some(hit) = hits.get(lane) {
                 let (point, normal) = self.plane(&rays.get(lane), &hit, origin);
                 for c in 0..3 {
@@ -167,10 +170,10 @@ impl ResolvedInstance<'_> {
     }
 
     #[inline(never)]
-    fn mesh_planes<S: Simd>(
+    fn triangle_planes<S: Simd>(
         &self,
         simd: S,
-        mesh: &TriMesh,
+        corners: &[Rows3; 3],
         lanes: u16,
         hits: &HitBlock,
         origin: DVec3,
@@ -179,15 +182,6 @@ impl ResolvedInstance<'_> {
         simd.vectorize(
             #[inline(always)]
             || {
-                let first = lanes.trailing_zeros() as usize & 15;
-                let mut corners = [Rows3::ZERO; 3];
-                for lane in 0..LANES {
-                    let from = if lanes >> lane & 1 != 0 { lane } else { first };
-                    let [a, b, c] = mesh.indices[hits.prim[from] as usize];
-                    corners[0].set(lane, mesh.positions[a as usize]);
-                    corners[1].set(lane, mesh.positions[b as usize]);
-                    corners[2].set(lane, mesh.positions[c as usize]);
-                }
                 let (moved, m) = (self.normal_from_object.is_some(), self.render_from_object);
                 let mut all = Planes::new();
                 for l in 0..LANES {
@@ -209,60 +203,35 @@ impl ResolvedInstance<'_> {
 
     /// Returns the lanes that it completed.
     #[inline(never)]
-    fn mesh_block<S: Simd, P: HitPoint>(
+    fn triangle_block<S: Simd, P: HitPoint>(
         &self,
         simd: S,
-        mesh: &TriMesh,
-        lanes: u16,
+        triangles: &TriangleRows,
         rays: &RayBlock,
         hits: &HitBlock,
         out: &mut ShadingPointBlock,
     ) -> u16 {
+        let exact = &mut ExactRows::new();
         simd.vectorize(
             #[inline(always)]
-            || {
-                self.mesh_block_body::<S, P>(
-                    simd,
-                    mesh,
-                    lanes,
-                    rays,
-                    hits,
-                    out,
-                    &mut ExactRows::new(),
-                )
-            },
+            || self.triangle_block_body::<S, P>(simd, triangles, rays, hits, out, exact),
         )
     }
 
     /// With [`HitPoint::EXACT`], fills `exact` too.
     #[inline(always)]
-    pub(super) fn mesh_block_body<S: Simd, P: HitPoint>(
+    pub(super) fn triangle_block_body<S: Simd, P: HitPoint>(
         &self,
         simd: S,
-        mesh: &TriMesh,
-        lanes: u16,
+        triangles: &TriangleRows,
         rays: &RayBlock,
         hits: &HitBlock,
         out: &mut ShadingPointBlock,
         exact: &mut ExactRows,
     ) -> u16 {
         let v = |x: f32| f32x16::splat(simd, x);
-        // Lanes without a hit repeat one that has a hit, so the code below needs no checks.
-        let first = lanes.trailing_zeros() as usize & 15;
-        let mut prims = hits.prim;
-        for lane in 0..LANES {
-            prims[lane] = if lanes >> lane & 1 != 0 { prims[lane] } else { prims[first] };
-        }
-        let mut corners: Corners = [[0; LANES]; 3];
-        for lane in 0..LANES {
-            let t = mesh.indices[prims[lane] as usize];
-            (corners[0][lane], corners[1][lane], corners[2][lane]) = (t[0], t[1], t[2]);
-        }
-        let a = gather3(simd, &mesh.positions, &corners[0]);
-        let b = gather3(simd, &mesh.positions, &corners[1]);
-        let c = gather3(simd, &mesh.positions, &corners[2]);
+        let [a, b, c] = [0, 1, 2].map(|k| Vec3x16::load(simd, &triangles.corners[k]));
         let (u, w2) = (f32x16::from_slice(simd, &hits.u), f32x16::from_slice(simd, &hits.v));
-        let weights = [v(1.0) - u - w2, u, w2];
         let dir = Vec3x16::load_rows(simd, [&rays.dx, &rays.dy, &rays.dz]);
 
         // ---- Face normal.
@@ -279,33 +248,21 @@ impl ResolvedInstance<'_> {
         }
 
         // ---- Shading normal.
-        let (outward, shading) = match self.shading_normals(mesh) {
-            None if P::EXACT => {
-                let unit = Vec3x16::load(simd, &exact.face_normal);
-                (unit, unit)
+        let (outward, shading) = if triangles.has_normals {
+            let mut s = Vec3x16::load(simd, &triangles.normals);
+            if let Some(m) = &self.normal_from_object {
+                s = s.transformed(simd, m);
             }
-            None => {
-                let unit = n.scale(v(1.0) / squared.sqrt());
-                (unit, unit)
-            }
-            Some(normals) => {
-                let mut s = match normals.per {
-                    PerElement::Vertex => {
-                        let p = gather3(simd, &normals.values, &corners[0]).scale(weights[0]);
-                        let p =
-                            p.add(gather3(simd, &normals.values, &corners[1]).scale(weights[1]));
-                        p.add(gather3(simd, &normals.values, &corners[2]).scale(weights[2]))
-                    }
-                    PerElement::Face => gather3(simd, &normals.values, &prims),
-                };
-                if let Some(m) = &self.normal_from_object {
-                    s = s.transformed(simd, m);
-                }
-                let (unit, ok) = s.try_normalize(simd);
-                done &= ok;
-                let n = if P::EXACT { Vec3x16::load(simd, &exact.face_normal) } else { n };
-                (n, unit)
-            }
+            let (unit, ok) = s.try_normalize(simd);
+            done &= ok;
+            let n = if P::EXACT { Vec3x16::load(simd, &exact.face_normal) } else { n };
+            (n, unit)
+        } else if P::EXACT {
+            let unit = Vec3x16::load(simd, &exact.face_normal);
+            (unit, unit)
+        } else {
+            let unit = n.scale(v(1.0) / squared.sqrt());
+            (unit, unit)
         };
 
         // ---- Orientation: seen side and lit side.
@@ -344,118 +301,15 @@ impl ResolvedInstance<'_> {
         }
 
         // ---- Colour.
-        let mut rgba = [[0.0; LANES]; 4];
-        let colored = match &self.material.color_source {
-            ColorSource::Attribute => match self.colors {
-                Some(colors) => {
-                    mix_colors(simd, colors, &corners, &prims, weights, &mut rgba);
-                    true
-                }
-                None => false,
-            },
-            ColorSource::Constant => false,
-            ColorSource::Scalars(map) => match self.scalars {
-                Some(scalars) => {
-                    let value = match scalars.per {
-                        PerElement::Vertex => {
-                            let [x, y, z] = [
-                                gather1(simd, &scalars.values, &corners[0]),
-                                gather1(simd, &scalars.values, &corners[1]),
-                                gather1(simd, &scalars.values, &corners[2]),
-                            ];
-                            x * weights[0] + y * weights[1] + z * weights[2]
-                        }
-                        PerElement::Face => gather1(simd, &scalars.values, &prims),
-                    };
-                    map.lookup_block(simd, value, &mut rgba);
-                    true
-                }
-                None => false,
-            },
-            ColorSource::Texture(_) => {
-                for lane in 0..LANES {
-                    let corner =
-                        [corners[0][lane], corners[1][lane], corners[2][lane]].map(|k| k as usize);
-                    let w = [weights[0][lane], weights[1][lane], weights[2][lane]];
-                    let color = self.mesh_color(mesh, corner, prims[lane], w);
-                    for c in 0..4 {
-                        rgba[c][lane] = color[c];
-                    }
-                }
-                true
-            }
-        };
-        let by_texture = matches!(self.material.color_source, ColorSource::Texture(_));
-        if colored && !by_texture && self.material.color_transfer != ColorTransfer::Linear {
-            for lane in 0..LANES {
-                let color = rgba.map(|row| row[lane]);
-                let linear = self.material.color_transfer.apply(color);
-                (0..4).for_each(|c| rgba[c][lane] = linear[c]);
-            }
-        }
-        let alpha = if colored {
-            out.color.0 = [rgba[0], rgba[1], rgba[2]];
-            f32x16::from_slice(simd, &rgba[3])
+        let alpha = if triangles.has_colors {
+            let [r, g, b, a] = &triangles.colors;
+            out.color.0 = [*r, *g, *b];
+            f32x16::from_slice(simd, a)
         } else {
             Vec3x16::splat(simd, Vec3::from(self.material.color)).store(&mut out.color);
             v(1.0)
         };
         drawn.select(v(self.material.opacity) * alpha, zero).store_slice(&mut out.opacity);
-        lanes & done.to_bitmask() as u16
-    }
-}
-
-#[inline(always)]
-fn gather1<S: Simd>(simd: S, values: &[f32], at: &[u32; LANES]) -> f32x16<S> {
-    let mut row = [0.0; LANES];
-    for lane in 0..LANES {
-        row[lane] = values[at[lane] as usize];
-    }
-    f32x16::from_slice(simd, &row)
-}
-
-#[inline(always)]
-fn gather3<S: Simd>(simd: S, values: &[Vec3], at: &[u32; LANES]) -> Vec3x16<S> {
-    let mut rows = Rows3::ZERO;
-    for lane in 0..LANES {
-        rows.set(lane, values[at[lane] as usize]);
-    }
-    Vec3x16::load(simd, &rows)
-}
-
-#[inline(always)]
-fn gather4(values: &[[f32; 4]], at: &[u32; LANES], rows: &mut [Row; 4]) {
-    for lane in 0..LANES {
-        let color = values[at[lane] as usize];
-        for c in 0..4 {
-            rows[c][lane] = color[c];
-        }
-    }
-}
-
-#[inline(always)]
-fn mix_colors<S: Simd>(
-    simd: S,
-    colors: &Attribute<[f32; 4]>,
-    corners: &Corners,
-    prims: &[u32; LANES],
-    [w, u, v]: [f32x16<S>; 3],
-    out: &mut [Row; 4],
-) {
-    if colors.per == PerElement::Face {
-        gather4(&colors.values, prims, out);
-        return;
-    }
-    let mut rows = [[[0.0; LANES]; 4]; 3];
-    for k in 0..3 {
-        gather4(&colors.values, &corners[k], &mut rows[k]);
-    }
-    for c in 0..4 {
-        let [x, y, z] = [
-            f32x16::from_slice(simd, &rows[0][c]),
-            f32x16::from_slice(simd, &rows[1][c]),
-            f32x16::from_slice(simd, &rows[2][c]),
-        ];
-        (x * w + y * u + z * v).store_slice(&mut out[c]);
+        done.to_bitmask() as u16
     }
 }

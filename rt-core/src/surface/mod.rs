@@ -10,18 +10,21 @@
 mod block;
 mod parameters;
 mod point_block;
+mod triangle;
+mod triangle_rows;
 
 pub(crate) use block::{ExactRows, Planes, ShadingPointBlock};
 pub(crate) use point_block::SurfacePointBlock;
 
-use crate::bvh::Geometry;
+use crate::bvh::{Geometry, StoredMesh};
 use crate::material::{ColorSource, Material, Sides};
 use crate::math::{length, max_abs};
-use crate::mesh::{Attribute, PerElement, TriMesh};
+use crate::mesh::{Attribute, TriMesh};
 use crate::ray::{Hit, Ray};
 use crate::scene::Scene;
 use crate::shapes::{Shape, ShapeHit};
-use glam::{DAffine3, DVec3, Mat3, Vec2, Vec3};
+use glam::{DAffine3, DVec3, Mat3, Vec3};
+use triangle::HitTriangle;
 
 /// One instance with all data for shading, resolved once per frame.
 pub(crate) struct ResolvedInstance<'a> {
@@ -31,6 +34,8 @@ pub(crate) struct ResolvedInstance<'a> {
     scalars: Option<&'a Attribute<f32>>,
     /// Object space (relative to the mesh's origin) to render space.
     render_from_object: DAffine3,
+    /// Its inverse, for shapes.
+    object_from_render: DAffine3,
     /// Inverse transpose of the linear part, up to a positive factor; `None` for the identity.
     normal_from_object: Option<Mat3>,
     /// -1 when the transform mirrors: triangles then wind the other way.
@@ -41,8 +46,11 @@ pub(crate) struct ResolvedInstance<'a> {
     moved: bool,
 }
 
+#[derive(Clone, Copy)]
 enum Source<'a> {
     Mesh(&'a TriMesh),
+    /// A shape whose points are those of triangles.
+    Stored(&'a StoredMesh),
     Shape(&'a dyn Shape),
 }
 
@@ -76,6 +84,12 @@ pub(crate) struct ShadingPoint {
     pub(crate) color: Vec3,
     /// Opacity, 0 for culled sides.
     pub(crate) opacity: f32,
+}
+
+impl From<SurfacePoint> for ShadingPoint {
+    fn from(s: SurfacePoint) -> ShadingPoint {
+        ShadingPoint { point: s.point, normal: s.normal, color: s.color, opacity: s.opacity }
+    }
 }
 
 /// Whether lights need the position of a [`ShadingPoint`].
@@ -146,7 +160,9 @@ impl<'a> ResolvedInstance<'a> {
             ),
             Geometry::Slices(_) => unreachable!("Scene::check refuses them"),
             Geometry::Shape(s) => {
-                (Source::Shape(&**s), s.origin(), appearance.colors(), appearance.scalars())
+                let stored = s.as_any().and_then(|s| s.downcast_ref::<StoredMesh>());
+                let source = stored.map_or(Source::Shape(&**s), Source::Stored);
+                (source, s.origin(), appearance.colors(), appearance.scalars())
             }
         };
         let linear = instance.world_from_object.matrix3;
@@ -155,12 +171,18 @@ impl<'a> ResolvedInstance<'a> {
         let columns = [linear.x_axis, linear.y_axis, linear.z_axis];
         // Frobenius norm: never below the largest singular value.
         let stretch = columns.iter().map(|c| c.length_squared()).sum::<f64>().sqrt() as f32;
+        let render_from_object = DAffine3 { matrix3: linear, translation: shift };
         ResolvedInstance {
             source,
             material: &scene.materials[appearance.material],
             colors,
             scalars,
-            render_from_object: DAffine3 { matrix3: linear, translation: shift },
+            render_from_object,
+            object_from_render: match source {
+                // Unused; a frame may have very many of them.
+                Source::Mesh(_) => DAffine3::IDENTITY,
+                Source::Stored(_) | Source::Shape(_) => render_from_object.inverse(),
+            },
             normal_from_object: (!identity).then(|| {
                 let n = linear.inverse().transpose();
                 // Scaled to order one, so that f32 holds it for any unit of length.
@@ -179,7 +201,11 @@ impl<'a> ResolvedInstance<'a> {
     #[inline]
     pub(crate) fn surface(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
         match self.source {
-            Source::Mesh(mesh) => self.mesh_surface(mesh, ray, hit),
+            Source::Mesh(mesh) => self.triangle_surface(&self.mesh_triangle(mesh, hit), ray, hit),
+            Source::Stored(mesh) => match self.stored_triangle(mesh, ray, hit) {
+                Some(triangle) => self.triangle_surface(&triangle, ray, hit),
+                None => self.shape_surface(mesh, ray, hit),
+            },
             Source::Shape(shape) => self.shape_surface(shape, ray, hit),
         }
     }
@@ -190,48 +216,41 @@ impl<'a> ResolvedInstance<'a> {
     #[inline]
     pub(crate) fn shading_point<P: HitPoint>(&self, ray: &Ray, hit: &Hit) -> ShadingPoint {
         match self.source {
-            Source::Mesh(mesh) => self.mesh_shading_point::<P>(mesh, ray, hit),
-            Source::Shape(shape) => {
-                let s = self.shape_surface(shape, ray, hit);
-                ShadingPoint {
-                    point: s.point,
-                    normal: s.normal,
-                    color: s.color,
-                    opacity: s.opacity,
-                }
+            Source::Mesh(mesh) => {
+                self.triangle_shading_point::<P>(&self.mesh_triangle(mesh, hit), ray, hit)
             }
+            Source::Stored(mesh) => match self.stored_triangle(mesh, ray, hit) {
+                Some(triangle) => self.triangle_shading_point::<P>(&triangle, ray, hit),
+                None => self.shape_surface(mesh, ray, hit).into(),
+            },
+            Source::Shape(shape) => self.shape_surface(shape, ray, hit).into(),
         }
     }
 
-    fn mesh_shading_point<P: HitPoint>(
+    fn triangle_shading_point<P: HitPoint>(
         &self,
-        mesh: &TriMesh,
+        triangle: &HitTriangle,
         ray: &Ray,
         hit: &Hit,
     ) -> ShadingPoint {
-        let corner = mesh.indices[hit.prim as usize].map(|k| k as usize);
-        let [a, b, c] = corner.map(|k| mesh.positions[k]);
-        let (u, v) = (hit.u, hit.v);
-        let weights = [1.0 - u - v, u, v];
+        let [a, b, c] = triangle.corners;
         let (e1, e2) = (b - a, c - a);
-        let smooth = self.shading_normals(mesh);
-
         let n = e1.cross(e2);
         let n = self.normal_from_object.map_or(n, |m| m * n);
         let squared = n.length_squared();
         let outward = if !ORDINARY_NORMAL_SQUARED.contains(&squared) {
             self.exact_normal([a, b, c], hit, ray)
-        } else if smooth.is_some() {
+        } else if triangle.normal.is_some() {
             // Any length is sufficient to orient the shading normal.
             n
         } else {
             n * (1.0 / squared.sqrt())
         };
-        let shading =
-            smooth.map_or(outward, |s| self.shading_normal(s, corner, hit.prim, weights, outward));
-        let point = if P::COMPUTED { self.moved_point(a, e1 * u + e2 * v) } else { Vec3::ZERO };
+        let shading = triangle.normal.map_or(outward, |n| self.shading_normal(n, outward));
+        let point =
+            if P::COMPUTED { self.moved_point(a, e1 * hit.u + e2 * hit.v) } else { Vec3::ZERO };
         let (_, normal, drawn) = self.turned(outward, shading, ray.dir);
-        let [r, g, b, alpha] = self.mesh_color(mesh, corner, hit.prim, weights);
+        let [r, g, b, alpha] = triangle.color;
         let opacity = if drawn { self.material.opacity * alpha } else { 0.0 };
         ShadingPoint { point, normal, color: Vec3::new(r, g, b), opacity }
     }
@@ -241,12 +260,6 @@ impl<'a> ResolvedInstance<'a> {
     #[inline(never)]
     fn exact_normal(&self, corners: [Vec3; 3], hit: &Hit, ray: &Ray) -> Vec3 {
         self.point_and_normal(corners, hit, ray).1
-    }
-
-    /// Normals to interpolate, if the material uses them.
-    #[inline(always)]
-    fn shading_normals<'m>(&self, mesh: &'m TriMesh) -> Option<&'m Attribute<Vec3>> {
-        mesh.normals.as_ref().filter(|_| !self.material.flat)
     }
 
     /// The render-space point `inside` away from the corner `a` of a triangle, in f32; adds the
@@ -264,72 +277,21 @@ impl<'a> ResolvedInstance<'a> {
     }
 
     #[inline]
-    fn mesh_surface(&self, mesh: &TriMesh, ray: &Ray, hit: &Hit) -> SurfacePoint {
-        let corner = mesh.indices[hit.prim as usize].map(|k| k as usize);
-        let [a, b, c] = corner.map(|k| mesh.positions[k]);
-        let (u, v) = (hit.u, hit.v);
-        let weights = [1.0 - u - v, u, v];
+    fn triangle_surface(&self, triangle: &HitTriangle, ray: &Ray, hit: &Hit) -> SurfacePoint {
+        let [a, b, c] = triangle.corners;
         let (point, outward) = self.point_and_normal([a, b, c], hit, ray);
-        let shading = self
-            .shading_normals(mesh)
-            .map_or(outward, |s| self.shading_normal(s, corner, hit.prim, weights, outward));
-        let [r, g, b_, alpha] = self.mesh_color(mesh, corner, hit.prim, weights);
+        let shading = triangle.normal.map_or(outward, |n| self.shading_normal(n, outward));
+        let [red, green, blue, alpha] = triangle.color;
         let coordinates = max_abs(a).max(max_abs(b)).max(max_abs(c));
-        self.finish(ray, point, coordinates, 0.0, outward, shading, Vec3::new(r, g, b_), alpha)
+        let color = Vec3::new(red, green, blue);
+        self.finish(ray, point, coordinates, 0.0, outward, shading, color, alpha)
     }
 
+    /// The unit normal in render space of one of a mesh.
     #[inline(always)]
-    fn shading_normal(
-        &self,
-        normals: &Attribute<Vec3>,
-        corner: [usize; 3],
-        prim: u32,
-        [w, u, v]: [f32; 3],
-        outward: Vec3,
-    ) -> Vec3 {
-        let n = match normals.per {
-            PerElement::Vertex => {
-                let [x, y, z] = corner.map(|k| normals.values[k]);
-                x * w + y * u + z * v
-            }
-            PerElement::Face => normals.values[prim as usize],
-        };
+    fn shading_normal(&self, n: Vec3, outward: Vec3) -> Vec3 {
         let n = self.normal_from_object.map_or(n, |m| m * n);
         n.try_normalize().unwrap_or_else(|| outward.normalize_or_zero())
-    }
-
-    #[inline(always)]
-    fn mesh_color(
-        &self,
-        mesh: &TriMesh,
-        corner: [usize; 3],
-        prim: u32,
-        [w, u, v]: [f32; 3],
-    ) -> [f32; 4] {
-        match &self.material.color_source {
-            ColorSource::Attribute => self.colors.map(|c| {
-                self.material.color_transfer.apply(interpolate4(c, corner, prim, [w, u, v]))
-            }),
-            ColorSource::Constant => None,
-            ColorSource::Scalars(map) => self.scalars.map(|s| {
-                let value = match s.per {
-                    PerElement::Vertex => {
-                        let [x, y, z] = corner.map(|k| s.values[k]);
-                        x * w + y * u + z * v
-                    }
-                    PerElement::Face => s.values[prim as usize],
-                };
-                self.material.color_transfer.apply(map.lookup(value))
-            }),
-            ColorSource::Texture(texture) => mesh.texcoords.as_ref().map(|uv| {
-                let [x, y, z] = corner.map(|k| uv[k]);
-                let at: Vec2 = x * w + y * u + z * v;
-                let [r, g, b, a] = texture.sample(at);
-                let [mr, mg, mb] = self.material.color;
-                [r * mr, g * mg, b * mb, a]
-            }),
-        }
-        .unwrap_or_else(|| self.constant())
     }
 
     /// Point and unit face normal in f64: no underflow for tiny triangles, no cancellation for
@@ -365,20 +327,7 @@ impl<'a> ResolvedInstance<'a> {
         let smooth = s.shading_normal.filter(|_| !self.material.flat);
         let shading = smooth.map(|n| self.normal_from_object.map_or(n, |m| m * n));
         let shading = shading.and_then(Vec3::try_normalize).unwrap_or(normal);
-        let from_attribute = match &self.material.color_source {
-            ColorSource::Attribute => match self.colors {
-                Some(c) => c.values.get(hit.prim as usize).copied(),
-                None => s.color,
-            },
-            ColorSource::Scalars(map) => {
-                let own = self.scalars.and_then(|v| v.values.get(hit.prim as usize).copied());
-                own.or(s.scalar).map(|v| map.lookup(v))
-            }
-            // Shapes have no texture coordinates.
-            ColorSource::Constant | ColorSource::Texture(_) => None,
-        };
-        let from_attribute = from_attribute.map(|c| self.material.color_transfer.apply(c));
-        let [r, g, b, alpha] = from_attribute.unwrap_or_else(|| self.constant());
+        let [r, g, b, alpha] = self.shape_color(hit.prim, s.color, s.scalar);
         self.finish(
             ray,
             point,
@@ -391,31 +340,56 @@ impl<'a> ResolvedInstance<'a> {
         )
     }
 
+    /// The colour of a point of a shape's primitive: the appearance's, else what the shape has.
+    fn shape_color(&self, prim: u32, color: Option<[f32; 4]>, scalar: Option<f32>) -> [f32; 4] {
+        let from_attribute = match &self.material.color_source {
+            ColorSource::Attribute => match self.colors {
+                Some(c) => c.values.get(prim as usize).copied(),
+                None => color,
+            },
+            ColorSource::Scalars(map) => {
+                let own = self.scalars.and_then(|v| v.values.get(prim as usize).copied());
+                own.or(scalar).map(|v| map.lookup(v))
+            }
+            // Shapes have no texture coordinates.
+            ColorSource::Constant | ColorSource::Texture(_) => None,
+        };
+        let from_attribute = from_attribute.map(|c| self.material.color_transfer.apply(c));
+        from_attribute.unwrap_or_else(|| self.constant())
+    }
+
     /// A world-space plane through the surface at the hit, as point and normal in f64, for exact
     /// depth: on triangles the plane of the triangle, elsewhere the tangent plane.
     pub(crate) fn plane(&self, ray: &Ray, hit: &Hit, origin: DVec3) -> (DVec3, DVec3) {
         match self.source {
             Source::Mesh(mesh) => {
-                let moved = self.normal_from_object.is_some();
-                plane_of(
-                    mesh.triangle(hit.prim as usize),
-                    [hit.u, hit.v],
-                    moved,
-                    &self.render_from_object,
-                    origin,
-                )
+                self.triangle_plane(mesh.triangle(hit.prim as usize), hit, origin)
             }
-            Source::Shape(shape) => {
-                let local_ray = self.object_ray(ray);
-                let s =
-                    shape.surface(hit.prim, &ShapeHit { t: hit.t, u: hit.u, v: hit.v }, &local_ray);
-                let n = self.normal_from_object.map_or(s.normal, |m| m * s.normal);
-                (
-                    origin + self.render_from_object.transform_point3(s.point.as_dvec3()),
-                    n.as_dvec3(),
-                )
-            }
+            Source::Stored(mesh) => match self.stored_triangle(mesh, ray, hit) {
+                Some(triangle) => self.triangle_plane(triangle.corners, hit, origin),
+                None => self.tangent_plane(mesh, ray, hit, origin),
+            },
+            Source::Shape(shape) => self.tangent_plane(shape, ray, hit, origin),
         }
+    }
+
+    fn triangle_plane(&self, corners: [Vec3; 3], hit: &Hit, origin: DVec3) -> (DVec3, DVec3) {
+        let moved = self.normal_from_object.is_some();
+        plane_of(corners, [hit.u, hit.v], moved, &self.render_from_object, origin)
+    }
+
+    fn tangent_plane(
+        &self,
+        shape: &dyn Shape,
+        ray: &Ray,
+        hit: &Hit,
+        origin: DVec3,
+    ) -> (DVec3, DVec3) {
+        let at = ShapeHit { t: hit.t, u: hit.u, v: hit.v };
+        let s = shape.surface(hit.prim, &at, &self.object_ray(ray));
+        let n = self.normal_from_object.map_or(s.normal, |m| m * s.normal);
+        let point = self.render_from_object.transform_point3(s.point.as_dvec3());
+        (origin + point, n.as_dvec3())
     }
 
     /// Corners of a triangle in render space; `None` for other shapes.
@@ -429,7 +403,7 @@ impl<'a> ResolvedInstance<'a> {
         if !self.moved {
             return *ray;
         }
-        let inverse = self.render_from_object.inverse();
+        let inverse = &self.object_from_render;
         Ray {
             origin: inverse.transform_point3(ray.origin.as_dvec3()).as_vec3(),
             dir: inverse.transform_vector3(ray.dir.as_dvec3()).as_vec3(),
@@ -486,22 +460,6 @@ impl<'a> ResolvedInstance<'a> {
         let face_normal = if outside { outward } else { -outward };
         let opacity = if drawn { self.material.opacity * alpha } else { 0.0 };
         SurfacePoint { point, point_error, face_normal, normal, outside, color, opacity }
-    }
-}
-
-#[inline]
-fn interpolate4(
-    a: &Attribute<[f32; 4]>,
-    corner: [usize; 3],
-    prim: u32,
-    [w, u, v]: [f32; 3],
-) -> [f32; 4] {
-    match a.per {
-        PerElement::Vertex => {
-            let [x, y, z] = corner.map(|k| a.values[k]);
-            std::array::from_fn(|c| x[c] * w + y[c] * u + z[c] * v)
-        }
-        PerElement::Face => a.values[prim as usize],
     }
 }
 

@@ -4,7 +4,7 @@ use super::{ResolvedInstance, Source};
 use crate::material_maps::{BsdfParameters, MaterialEvalContext, SurfaceParameters};
 use crate::mesh::PerElement;
 use crate::ray::{Hit, Ray};
-use crate::shapes::ShapeHit;
+use crate::shapes::{Shape, ShapeHit};
 use glam::Vec3;
 
 impl ResolvedInstance<'_> {
@@ -40,7 +40,12 @@ impl ResolvedInstance<'_> {
                 let flat = (b - a).cross(c - a).normalize_or_zero().as_vec3();
                 (Some(mesh), point, own.and_then(Vec3::try_normalize).unwrap_or(flat), flat)
             }
-            Source::Shape(shape) => {
+            Source::Stored(_) | Source::Shape(_) => {
+                let shape: &dyn Shape = match self.source {
+                    Source::Stored(mesh) => mesh,
+                    Source::Shape(shape) => shape,
+                    Source::Mesh(_) => return None,
+                };
                 let s = shape.surface(
                     hit.prim,
                     &ShapeHit { t: hit.t, u: hit.u, v: hit.v },

@@ -5,8 +5,8 @@
 //! shading normal are left to that function.
 
 use super::block::{ExactRows, ShadingPointBlock};
-use super::{HitPoint, POINT_ERROR, ResolvedInstance, Source, SurfacePoint};
-use crate::mesh::TriMesh;
+use super::triangle_rows::TriangleRows;
+use super::{HitPoint, POINT_ERROR, ResolvedInstance, SurfacePoint};
 use crate::ray::{HitBlock, LANES, RayBlock};
 use crate::simd::vectors::{Row, Rows3, Vec3x16};
 use fearless_simd::{Simd, SimdBase, f32x16, mask32x16};
@@ -72,25 +72,29 @@ impl ResolvedInstance<'_> {
         hits: &HitBlock,
         out: &mut SurfacePointBlock,
     ) -> u16 {
-        match self.source {
-            Source::Mesh(mesh) => self.mesh_points(simd, mesh, lanes, rays, hits, out),
-            Source::Shape(_) => 0,
+        let mut triangles = TriangleRows::new();
+        match self.triangle_rows(simd, lanes, rays, hits, &mut triangles) {
+            0 => 0,
+            found => found & self.triangle_points(simd, &triangles, rays, hits, out),
         }
     }
 
     #[inline(never)]
-    fn mesh_points<S: Simd>(
+    fn triangle_points<S: Simd>(
         &self,
         simd: S,
-        mesh: &TriMesh,
-        lanes: u16,
+        triangles: &TriangleRows,
         rays: &RayBlock,
         hits: &HitBlock,
         SurfacePointBlock { shading, exact }: &mut SurfacePointBlock,
     ) -> u16 {
         simd.vectorize(
             #[inline(always)]
-            || self.mesh_block_body::<S, ExactPoint>(simd, mesh, lanes, rays, hits, shading, exact),
+            || {
+                self.triangle_block_body::<S, ExactPoint>(
+                    simd, triangles, rays, hits, shading, exact,
+                )
+            },
         )
     }
 

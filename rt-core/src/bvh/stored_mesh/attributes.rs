@@ -20,6 +20,8 @@ use glam::Vec3;
 use std::collections::HashMap;
 
 const HEADER_WORDS: usize = 6;
+/// Triangles of which one's number is kept unpacked, for the search.
+const STRIDE: u32 = 16;
 /// More triangles than any page has: numbers of bits stay small.
 const MOST_TRIANGLES: u32 = 1 << 20;
 const NORMALS: u32 = 1;
@@ -50,10 +52,10 @@ struct Values {
 
 /// What a hit has.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct HitAttributes {
-    pub(super) normal: Option<Vec3>,
-    pub(super) color: Option<[f32; 4]>,
-    pub(super) scalar: Option<f32>,
+pub(crate) struct HitAttributes {
+    pub(crate) normal: Option<Vec3>,
+    pub(crate) color: Option<[f32; 4]>,
+    pub(crate) scalar: Option<f32>,
 }
 
 /// Values of vertices, or of triangles, on their way into a page.
@@ -198,6 +200,8 @@ pub(super) struct PageAttributes {
     triangles: u32,
     first: u32,
     id_width: u32,
+    /// The numbers of triangles 0, [`STRIDE`] and so on of the page.
+    some_ids: Vec<u32>,
     vertices: ValuePlaces,
     faces: ValuePlaces,
 }
@@ -256,7 +260,9 @@ impl PageAttributes {
             return Err("the attributes do not end where the page does");
         }
         let [vertices, faces] = places;
-        let found = PageAttributes { words, triangles, first, id_width, vertices, faces };
+        let some_ids = Vec::new();
+        let mut found =
+            PageAttributes { words, triangles, first, id_width, some_ids, vertices, faces };
         let exist = |p: &ValuePlaces, numbers: u32| {
             p.fields == 0 || (0..numbers).all(|i| found.number(p, i) < p.count)
         };
@@ -264,18 +270,31 @@ impl PageAttributes {
         if !exist(&found.vertices, 3 * triangles) || !exist(&found.faces, triangles) || !ascending {
             return Err("a value that is asked for does not exist");
         }
+        found.some_ids = (0..triangles).step_by(STRIDE as usize).map(|k| found.id(k)).collect();
         Ok(found)
     }
 
     /// Bytes in memory.
     pub(super) fn bytes(&self) -> usize {
-        4 * self.words.len() + size_of::<PageAttributes>()
+        4 * (self.words.len() + self.some_ids.len()) + size_of::<PageAttributes>()
     }
 
     /// The number of the triangle in the piece that is `k`th of the page, from the first on.
     fn id(&self, k: u32) -> u32 {
         let at = 32 * HEADER_WORDS + (k * self.id_width) as usize;
         bits::read(&self.words, at, self.id_width)
+    }
+
+    /// Which of the page's triangles, in ascending order, has this number.
+    fn place_of(&self, id: u32) -> Option<u32> {
+        let stretch = self.some_ids.partition_point(|&first| first <= id).checked_sub(1)?;
+        let mut low = stretch as u32 * STRIDE;
+        let mut high = (low + STRIDE).min(self.triangles);
+        while low < high {
+            let middle = low + (high - low) / 2;
+            if self.id(middle) < id { low = middle + 1 } else { high = middle }
+        }
+        (low < self.triangles && self.id(low) == id).then_some(low)
     }
 
     fn number(&self, p: &ValuePlaces, i: u32) -> u32 {
@@ -287,15 +306,8 @@ impl PageAttributes {
     pub(super) fn at(&self, id: u32, [w, u, v]: [f32; 3]) -> HitAttributes {
         let mut found = HitAttributes::default();
         let Some(id) = id.checked_sub(self.first) else { return found };
-        let (mut low, mut high) = (0, self.triangles);
-        while low < high {
-            let middle = low + (high - low) / 2;
-            if self.id(middle) < id { low = middle + 1 } else { high = middle }
-        }
-        if low >= self.triangles || self.id(low) != id {
-            return found;
-        }
-        let (p, k) = (&self.faces, low);
+        let Some(k) = self.place_of(id) else { return found };
+        let p = &self.faces;
         if p.fields != 0 {
             let i = self.number(p, k);
             found.normal = (p.fields & NORMALS != 0).then(|| self.normal(p, i));

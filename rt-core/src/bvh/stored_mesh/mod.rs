@@ -26,6 +26,7 @@ mod packets;
 mod page;
 mod read;
 mod recent_hits;
+mod surface;
 #[cfg(test)]
 mod tests;
 mod write;

@@ -5,12 +5,13 @@ use crate::bvh::compact::{CompactBvh, TrianglePlace, check_units, new_key, with_
 use crate::bvh::layout::triangles::{leaf_floats, leaf_triangle_ids};
 use crate::bvh::layout::wide::{ChildRef, LEAF_SIZE, Unit, WIDTH, WideBvh};
 use crate::bvh::query::{ClosestHit, WatertightTest};
+use crate::bvh::traverse::block_hits::set_bits;
 use crate::bvh::traverse::meshlets;
 use crate::bvh::traverse::single::{LeafTest, RaySetup};
 use crate::bvh::traverse::tree_view::TreeView;
 use crate::bvh::traverse::triangle_leaf::{ClosestLeaf, ClosestTri};
 use crate::bvh::triangle_bvh;
-use crate::ray::Ray;
+use crate::ray::{LANES, Ray};
 use fearless_simd::{Level, Simd, dispatch};
 use glam::Vec3;
 
@@ -30,6 +31,8 @@ pub(super) struct PageHit {
 }
 
 impl PageHit {
+    pub(super) const NONE: PageHit = PageHit { first: 0, id: 0, corners: [Vec3::ZERO; 3] };
+
     /// Number of the triangle in the mesh.
     pub(super) fn triangle(&self) -> u64 {
         self.first + u64::from(self.id)
@@ -85,21 +88,28 @@ impl Page {
 }
 
 impl Page {
-    /// The triangle at a place. `None` when it is not known.
-    pub(super) fn triangle_at(&self, level: Level, place: TrianglePlace) -> Option<PageHit> {
-        let (unit, leaf, slot) = place.parts()?;
+    /// The triangles at those places of `lanes` that are known.
+    pub(super) fn triangles_at(
+        &self,
+        level: Level,
+        lanes: u16,
+        places: &[TrianglePlace; LANES],
+        mut found: impl FnMut(usize, PageHit),
+    ) {
         let (units, key) = (&self.tree.bvh.units, self.tree.key);
-        if unit >= units.len() {
-            return None;
-        }
-        let reference = ChildRef::leaf(unit, 1);
-        let (id, corners) = with_cache(|cache| {
-            dispatch!(level, simd => {
-                let (expanded, words) = cache.meshlet(simd, key, units, reference);
-                expanded.leaves.triangle(simd, words, leaf, slot)
-            })
-        })?;
-        Some(PageHit { first: self.first, id, corners })
+        with_cache(|cache| {
+            dispatch!(level, simd => for lane in set_bits(lanes) {
+                let Some((unit, leaf, slot)) = places[lane].parts() else { continue };
+                if unit >= units.len() {
+                    continue;
+                }
+                let meshlet = ChildRef::leaf(unit, 1);
+                let (expanded, words) = cache.meshlet(simd, key, units, meshlet);
+                if let Some((id, corners)) = expanded.leaves.triangle(simd, words, leaf, slot) {
+                    found(lane, PageHit { first: self.first, id, corners });
+                }
+            });
+        });
     }
 }
 

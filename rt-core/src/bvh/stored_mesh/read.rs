@@ -7,7 +7,7 @@ use super::format::{
     Attributes, ENTRY_BYTES, HEADER_BYTES, Header, MAGIC, NoHeader, PageEntry, VERSION,
 };
 use super::page::{Page, PageHit};
-use super::recent_hits;
+use super::surface::TriangleHit;
 use crate::bvh::layout::wide::Unit;
 use crate::math::Aabb;
 use crate::paging::fields::checksum;
@@ -42,7 +42,7 @@ pub struct StoredMesh {
     header: Header,
     table: Vec<PageEntry>,
     cache: PageCache<Part>,
-    level: Level,
+    pub(super) level: Level,
     /// The first page that could not be read, and why.
     failure: OnceLock<String>,
 }
@@ -163,23 +163,22 @@ impl StoredMesh {
         self.cache.with(number, || self.keep_failure(self.read_page(number)), page).flatten()
     }
 
-    /// What a point of a triangle of a page has beside its place.
-    fn attributes_at(&self, page: u32, id: u32, weights: [f32; 3]) -> HitAttributes {
+    /// Calls `work` with the attributes of a page, where there are any that can be read.
+    pub(super) fn with_attributes(&self, page: u32, work: impl FnOnce(&PageAttributes)) {
         let entry = &self.table[page as usize];
         if entry.attribute_words == 0 || !self.header.attributes.any() {
-            return HitAttributes::default();
+            return;
         }
         let read = || self.keep_failure(self.read_attributes(page));
-        let at = |part: &Part| match part {
-            Part::Attributes(attributes) => attributes.at(id, weights),
-            Part::Page(_) => HitAttributes::default(),
+        let with = |part: &Part| match part {
+            Part::Attributes(attributes) => work(attributes),
+            Part::Page(_) => {}
         };
         // Behind the pages.
         let place = self.table.len() + page as usize;
-        u32::try_from(place)
-            .ok()
-            .and_then(|place| self.cache.with(place, read, at))
-            .unwrap_or_default()
+        if let Ok(place) = u32::try_from(place) {
+            self.cache.with(place, read, with);
+        }
     }
 
     /// What was read; keeps the reason where it was not.
@@ -221,7 +220,7 @@ impl StoredMesh {
     }
 
     /// The triangle that the ray hits in a page.
-    fn hit(&self, page: u32, ray: &Ray) -> Option<PageHit> {
+    pub(super) fn hit(&self, page: u32, ray: &Ray) -> Option<PageHit> {
         self.table.get(page as usize)?;
         self.with_page(page, |page| page.triangle(self.level, ray)).flatten()
     }
@@ -277,17 +276,11 @@ impl Shape for StoredMesh {
             scalar: found.scalar,
             color: found.color,
         };
-        let place = recent_hits::find(self.key(), page, ray, hit.t);
-        let known = self.with_page(page, |page| page.triangle_at(self.level, place)).flatten();
-        // The same hit by a ray that ends there: it meets few boxes.
-        let to_hit = Ray { t_min: hit.t, t_max: hit.t.next_up(), ..*ray };
-        let found = known.or_else(|| self.hit(page, &to_hit)).or_else(|| self.hit(page, ray));
-        let Some(PageHit { corners, id, .. }) = found else {
+        let Some(TriangleHit { corners, attributes }) = self.triangle_hit(page, hit, ray) else {
             // The page could be read for the hit and cannot be read now: the render fails.
             let against = -ray.dir.normalize_or_zero();
             return surface(ray.at(hit.t), 0.0, against, HitAttributes::default());
         };
-        let attributes = self.attributes_at(page, id, [1.0 - hit.u - hit.v, hit.u, hit.v]);
         let [a, b, c] = corners.map(|p| p.as_dvec3());
         let (e1, e2) = (b - a, c - a);
         let p = a + e1 * f64::from(hit.u) + e2 * f64::from(hit.v);

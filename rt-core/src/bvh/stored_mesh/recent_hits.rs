@@ -5,6 +5,7 @@
 //! in the same page, has hit the same triangle: what is found here is what a search would find.
 
 use crate::bvh::compact::TrianglePlace;
+use crate::bvh::traverse::block_hits::set_bits;
 use crate::ray::{HitBlock, LANES, NO_HIT, Ray, RayBlock};
 use std::cell::Cell;
 
@@ -71,12 +72,24 @@ pub(super) fn keep(
     RECENT.set(Some(recent));
 }
 
-/// The place of the triangle that `ray` hits at `t` in a page; none where it is not known any more.
-pub(super) fn find(mesh: u64, page: u32, ray: &Ray, t: f32) -> TrianglePlace {
-    let Some(recent) = RECENT.take() else { return TrianglePlace::NONE };
-    let bits = bits_of(ray, t);
-    let same = |hit: &&RecentHit| (hit.mesh, hit.page, hit.bits) == (mesh, page, bits);
-    let place = recent[set_of(&bits)].iter().find(same).map(|hit| hit.place);
+/// The places of the triangles that the rays of `lanes` have hit in a mesh; none where one is not
+/// known any more.
+pub(super) fn find(
+    mesh: u64,
+    lanes: u16,
+    rays: &[Ray; LANES],
+    hits: &HitBlock,
+) -> [TrianglePlace; LANES] {
+    let mut places = [TrianglePlace::NONE; LANES];
+    let Some(recent) = RECENT.take() else { return places };
+    for lane in set_bits(lanes) {
+        let bits = bits_of(&rays[lane], hits.t[lane]);
+        let wanted = (mesh, hits.prim[lane], bits);
+        let set = &recent[set_of(&bits)];
+        if let Some(hit) = set.iter().find(|hit| (hit.mesh, hit.page, hit.bits) == wanted) {
+            places[lane] = hit.place;
+        }
+    }
     RECENT.set(Some(recent));
-    place.unwrap_or(TrianglePlace::NONE)
+    places
 }

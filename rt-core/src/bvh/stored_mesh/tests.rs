@@ -378,10 +378,12 @@ fn surfaces_of_packets_are_found_without_a_search_and_are_those_of_one_bit_for_b
             let mut found = vec![HitBlock::MISS; blocks.len()];
             world.closest_coherent(&blocks, &mut found).expect("as many");
             for (i, ray) in all.iter().enumerate() {
-                let Some(hit) = found[i / LANES].get(i % LANES) else { continue };
-                let place = recent_hits::find(stored.key(), hit.prim, ray, hit.t);
+                let lane = i % LANES;
+                let Some(hit) = found[i / LANES].get(lane) else { continue };
+                let (key, of_block) = (stored.key(), &found[i / LANES]);
+                let places = recent_hits::find(key, 1 << lane, &[*ray; LANES], of_block);
                 *hits += 1;
-                *known += usize::from(place.parts().is_some());
+                *known += usize::from(places[lane].parts().is_some());
                 let at = ShapeHit { t: hit.t, u: hit.u, v: hit.v };
                 let [a, b] = [&stored, &other].map(|mesh| mesh.surface(hit.prim, &at, ray));
                 assert_eq!((a.point, a.normal, a.point_error), (b.point, b.normal, b.point_error));
