@@ -5,7 +5,7 @@ use datasets::cli::CureExt as _;
 use datasets::generate::mixing_layer::{self, MixingLayer};
 use datasets::generate::nested_wavelet::{POINTS, isovalues_for};
 use datasets::generate::wavelet::Wavelet;
-use datasets::isosurface::{self, Options, PlaneSource as _};
+use datasets::isosurface::{self, Options, PlaneSource};
 use datasets::stored_volume;
 use rayon::prelude::*;
 use rt_core::grid::Grid;
@@ -74,18 +74,32 @@ pub fn mixing_layer_pieces(
     progress: &mut dyn FnMut(u32, u32) -> anyhow::Result<()>,
     take: impl FnMut(TriMesh) -> anyhow::Result<()>,
 ) -> anyhow::Result<()> {
-    let layer = MixingLayer::new(points, SEED);
-    let (dims, origin, spacing) = (layer.dims(), layer.origin(), layer.spacing());
+    surface_pieces(&MixingLayer::new(points, SEED), mixing_layer::ISO, options, progress, take)
+}
+
+/// An isosurface of a field that is made plane by plane, in pieces; see [`store_mixing_layer`] for
+/// `progress`.
+///
+/// # Errors
+/// Those of `progress` and of `take`.
+pub fn surface_pieces(
+    source: &dyn PlaneSource,
+    iso: f64,
+    options: Options,
+    progress: &mut dyn FnMut(u32, u32) -> anyhow::Result<()>,
+    take: impl FnMut(TriMesh) -> anyhow::Result<()>,
+) -> anyhow::Result<()> {
+    let (dims, origin, spacing) = (source.dims(), source.origin(), source.spacing());
     let extent = GridExtent { dims, origin, spacing };
     let plane = dims.x as usize * dims.y as usize;
     let fill = |range: Range<u32>, values: &mut [f32]| {
         progress(range.start, dims.z)?;
         let planes = values.par_chunks_mut(plane).enumerate();
-        planes.for_each(|(k, plane)| layer.fill_plane(range.start + k as u32, plane));
+        planes.for_each(|(k, plane)| source.fill_plane(range.start + k as u32, plane));
         Ok(())
     };
     let batch = PLANES_AT_ONCE as usize;
-    isosurface::extract_pieces(&extent, mixing_layer::ISO, options, batch, fill, take)?;
+    isosurface::extract_pieces(&extent, iso, options, batch, fill, take)?;
     Ok(())
 }
 
