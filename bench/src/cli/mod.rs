@@ -71,7 +71,7 @@ struct RunArgs {
     /// Smaller data and fewer rounds: each experiment within a minute
     #[arg(long)]
     quick: bool,
-    /// The dissertation's own sizes (stored-files). Takes a quarter of an hour and up to 16 GB
+    /// The dissertation's own sizes (stored-files). Takes three quarters of an hour and up to 25 GB
     /// on disk, asked for first; the files are kept in the cache (RTSV_CACHE) for the next run
     #[arg(long, conflicts_with = "quick")]
     thesis: bool,
