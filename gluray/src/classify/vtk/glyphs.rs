@@ -38,9 +38,14 @@ fn columns<const N: usize>(program: u32, name: &str) -> Result<[ArraySource; N],
         }
         *column = ArraySource::of_attribute(at);
     }
-    match out.iter().all(Option::is_some) {
-        true => Ok(out.map(|c| c.expect("checked"))),
-        false => Err(NONE),
+    if out.iter().any(Option::is_none) {
+        return Err(NONE);
+    }
+    let out = out.map(|c| c.expect("checked"));
+    // A frame looks at one buffer for each array, to see whether it was written.
+    match out.iter().all(|c| c.buffer == out[0].buffer) {
+        true => Ok(out),
+        false => Err("glyphs of VTK's with a matrix in several buffers"),
     }
 }
 
