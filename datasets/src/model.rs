@@ -17,6 +17,7 @@ pub mod lines;
 mod merge;
 pub mod polygon;
 pub(crate) mod shape_of_faces;
+pub mod shared_faces;
 pub mod surface;
 mod wall_names;
 
@@ -24,6 +25,7 @@ pub use array::{Attributes, DataArray, Endian, ScalarType, Values};
 pub use cells::{CellType, Cells};
 pub use coloring::ColorBy;
 pub use lines::{PointSet, Polyline};
+pub use shared_faces::{PieceBoundaries, SharedFaces};
 pub use surface::SurfaceReport;
 pub use wall_names::{BAFFLES, WALL_POINTS, is_name_of_body};
 

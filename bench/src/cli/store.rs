@@ -6,6 +6,7 @@ use super::{StoreArgs, store_isosurface, store_volume};
 use crate::stored_data::{mixing_layer_pieces, wavelet_surfaces};
 use datasets::cli::{Cancel, CommonArgs, CureExt as _, UsageError};
 use datasets::isosurface::Options;
+use datasets::model::{PieceBoundaries, SharedFaces};
 use datasets::read::obj_pieces::ObjPieces;
 use datasets::read::ply_pieces::PlyPieces;
 use datasets::read::stl_pieces::StlPieces;
@@ -14,7 +15,8 @@ use datasets::read::vtk_xml::{PieceFiles, piece_files};
 use datasets::read::{Content, LoadedFile};
 use rt_core::bvh::StoredMeshReport;
 use serde_json::json;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Instant;
 
 pub(super) const EXAMPLES: &str = "\
@@ -152,23 +154,16 @@ fn store_file(
     } else if (named("pvtp") || named("pvtu"))
         && let Some(PieceFiles { files, .. }) = piece_files(file)?
     {
+        let between = if named("pvtu") { faces_between(common, &mut job, &files)? } else { None };
         let bar = common.progress(files.len() as u64, "storing");
-        let mut without_copies = 0;
         for piece in &files {
             let opened = datasets::read::open(piece)?;
             // A process without a part of the data writes a piece without cells, and often
             // without the arrays of the others.
             if !is_empty(&opened) {
-                job.add_piece(piece, &opened)?;
-                without_copies += usize::from(named("pvtu") && !has_ghost_cells(&opened));
+                job.add_piece(piece, &opened, between.clone())?;
             }
             bar.inc(1);
-        }
-        if without_copies > 1 {
-            job.warn_once(format!(
-                "{without_copies} pieces have no ghost cells, so the faces between them are \
-                 stored too; ParaView's filter Ghost Cells adds such cells"
-            ));
         }
     } else {
         let opened = datasets::read::open(file)?;
@@ -178,6 +173,41 @@ fn store_file(
         }
     }
     job.finish(file)
+}
+
+/// The faces between pieces of solid cells that have no ghost cells: each piece is read once for
+/// them. `None` where ghost cells tell.
+fn faces_between(
+    common: CommonArgs,
+    job: &mut StoreJob<'_>,
+    files: &[PathBuf],
+) -> anyhow::Result<Option<Arc<SharedFaces>>> {
+    let bar = common.progress(files.len() as u64, "faces between the pieces");
+    let (mut boundaries, mut without_copies) = (PieceBoundaries::default(), 0);
+    for file in files {
+        let opened = datasets::read::open(file)?;
+        if let Content::Data(data) = &opened.content
+            && !is_empty(&opened)
+            && !has_ghost_cells(&opened)
+        {
+            without_copies += 1;
+            boundaries.add(data);
+        }
+        bar.inc(1);
+    }
+    if without_copies < 2 {
+        return Ok(None);
+    }
+    let shared = boundaries.shared_faces();
+    if shared.is_empty() {
+        job.warn_once(format!(
+            "{without_copies} pieces have no ghost cells and no face in common: should they touch \
+             one another, the faces between them are stored too; ParaView's filter Ghost Cells \
+             adds such cells"
+        ));
+    }
+    common.note(1, format_args!("{} faces between pieces are left out", shared.len()));
+    Ok(Some(Arc::new(shared)))
 }
 
 /// Whether a file has no cells.

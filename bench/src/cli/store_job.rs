@@ -5,6 +5,7 @@ use super::mesh_file::with_origin;
 use crate::image::subject::{LoadOptions, PartColoring, Subject};
 use anyhow::Context as _;
 use datasets::cli::{Cancel, CommonArgs, ProgressBar, UsageError};
+use datasets::model::SharedFaces;
 use datasets::read::LoadedFile;
 use datasets::{PagedFile, stored_mesh};
 use rt_core::bvh::{Geometry, StoredMeshReport, StoredMeshWriter};
@@ -12,6 +13,7 @@ use rt_core::glam::DVec3;
 use rt_core::mesh::{MeshSlices, TriMesh};
 use std::collections::HashSet;
 use std::path::Path;
+use std::sync::Arc;
 
 /// A file that is being written.
 pub(super) struct StoreJob<'a> {
@@ -73,10 +75,17 @@ impl<'a> StoreJob<'a> {
         self.add_loaded(file, opened, &LoadOptions { origin, ..LoadOptions::default() })
     }
 
-    /// Adds the meshes of one of several files, which may have none.
-    pub(super) fn add_piece(&mut self, file: &Path, opened: &LoadedFile) -> anyhow::Result<()> {
+    /// Adds the meshes of one of several files, which may have none, without the faces that it
+    /// shares with others.
+    pub(super) fn add_piece(
+        &mut self,
+        file: &Path,
+        opened: &LoadedFile,
+        shared_faces: Option<Arc<SharedFaces>>,
+    ) -> anyhow::Result<()> {
+        let origin = self.origin();
         let options =
-            LoadOptions { origin: self.origin(), without_points: true, ..LoadOptions::default() };
+            LoadOptions { origin, without_points: true, shared_faces, ..LoadOptions::default() };
         self.add_loaded(file, opened, &options)
     }
 

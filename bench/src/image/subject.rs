@@ -5,7 +5,7 @@ use super::framing::corners_of_box;
 use super::materials::SceneMaterials;
 use anyhow::Context as _;
 use datasets::catalogue::Data;
-use datasets::model::{ColorBy, Dataset};
+use datasets::model::{ColorBy, Dataset, SharedFaces};
 use datasets::read::{Content, LoadedFile, SceneModel};
 use glam::{DVec3, UVec3, Vec3};
 use rt_core::bvh::{Geometry, StoredMesh};
@@ -122,6 +122,8 @@ pub struct LoadOptions {
     /// Whether points of a data set without triangles and lines are left out. A piece that lies
     /// inside of a volume has no surface, and its points are none of the picture's.
     pub without_points: bool,
+    /// Faces between this piece and others, which are left out.
+    pub shared_faces: Option<Arc<SharedFaces>>,
 }
 
 /// Selects the field for volume rendering.
@@ -355,7 +357,8 @@ fn from_data(data: &Dataset, load_options: &LoadOptions) -> anyhow::Result<Subje
         subject.add_mesh(found.mesh, DEFAULT_COLOR);
         return Ok(subject);
     }
-    let (mesh, report) = data.to_trimesh_at(color.as_deref(), load_options.origin)?;
+    let (shared, origin) = (load_options.shared_faces.as_deref(), load_options.origin);
+    let (mesh, report) = data.to_trimesh_between(color.as_deref(), origin, shared)?;
     subject.warnings.extend(report.warnings());
     if mesh.num_triangles() > 0 {
         subject.add_mesh(mesh, DEFAULT_COLOR);

@@ -3,7 +3,7 @@
 use super::boundary_faces::{BoundaryFaces, Faces};
 use super::polygon::{Division, triangulate};
 use super::{
-    Attributes, CellType, Cells, ColorBy, DataArray, Dataset, ModelError, PolyData,
+    Attributes, CellType, Cells, ColorBy, DataArray, Dataset, ModelError, PolyData, SharedFaces,
     UnstructuredGrid, coloring::linear_from_srgb8, extent_dims, lattice_counts,
 };
 use glam::{DVec3, Vec2, Vec3};
@@ -34,6 +34,9 @@ pub struct SurfaceReport {
     pub straightened_cells: usize,
     /// Data sets of a collection that lack the requested array; their values are NaN.
     pub blocks_without_array: usize,
+    /// Faces left out because another piece has them too
+    /// ([`to_trimesh_between`](Dataset::to_trimesh_between)).
+    pub shared_faces: usize,
 }
 
 impl SurfaceReport {
@@ -79,6 +82,17 @@ impl Dataset {
         color_by: Option<&str>,
         origin: Option<DVec3>,
     ) -> Result<(TriMesh, SurfaceReport), ModelError> {
+        self.to_trimesh_between(color_by, origin, None)
+    }
+
+    /// [`Dataset::to_trimesh_at`] of a piece, without the faces that it shares with other pieces:
+    /// for pieces that have no ghost cells.
+    pub fn to_trimesh_between(
+        &self,
+        color_by: Option<&str>,
+        origin: Option<DVec3>,
+        shared: Option<&SharedFaces>,
+    ) -> Result<(TriMesh, SurfaceReport), ModelError> {
         self.check()?;
         let color = color_by.map(|name| ColorBy::find(self, name)).transpose()?;
         let mut out = Builder::new(color);
@@ -98,7 +112,7 @@ impl Dataset {
             out.begin(leaf);
             match leaf {
                 Dataset::PolyData(d) => out.poly_data(d),
-                Dataset::UnstructuredGrid(d) => out.unstructured(d),
+                Dataset::UnstructuredGrid(d) => out.unstructured(d, shared),
                 Dataset::ImageData(d) => {
                     out.lattice(extent_dims(d.extent), &d.attributes, |i, j, k| d.point(i, j, k))
                 }
@@ -304,7 +318,7 @@ impl Builder {
         }
     }
 
-    fn unstructured(&mut self, d: &UnstructuredGrid) {
+    fn unstructured(&mut self, d: &UnstructuredGrid, shared: Option<&SharedFaces>) {
         let from = self.source(&d.attributes);
         let n = d.points.len();
         self.vertex_of_point.resize(n, Cells::NO_POINT);
@@ -349,6 +363,11 @@ impl Builder {
                         Faces::Complete => {}
                         Faces::TooFewPoints => self.report.too_few_points += 1,
                         Faces::BadIds => self.report.bad_ids += 1,
+                    }
+                    if let Some(shared) = shared {
+                        let found = outer.len();
+                        outer.retain(|ids| !shared.contains(ids.iter().map(|&k| at(k as usize))));
+                        self.report.shared_faces += found - outer.len();
                     }
                     outer.iter().for_each(|ids| self.polygon(ids, cell, &at, &from));
                 }
