@@ -50,6 +50,7 @@ fn image(one_layer: bool, brightness: f32) -> WindowImage {
         .expect("a volume");
     let view = View {
         clip_from_world: DMat4::from_scale(DVec3::new(0.8, 0.8, -0.4)),
+        viewer: None,
         width: SIZE,
         height: SIZE,
         background: [BACKGROUND; 2],
