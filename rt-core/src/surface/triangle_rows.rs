@@ -83,7 +83,7 @@ impl ResolvedInstance<'_> {
             Source::Stored(mesh) => {
                 let mut found = 0;
                 let rays = std::array::from_fn(|lane| self.object_ray(&rays.get(lane)));
-                mesh.triangle_hits(lanes, &rays, hits, |lane, triangle| {
+                mesh.triangle_hits(lanes, &rays, hits, false, |lane, triangle| {
                     found |= 1 << lane;
                     (0..3).for_each(|k| corners[k].set(lane, triangle.corners[k]));
                 });
@@ -106,7 +106,8 @@ impl ResolvedInstance<'_> {
         let colored =
             !matches!(self.material.color_source, ColorSource::Constant | ColorSource::Texture(_));
         let rays = std::array::from_fn(|lane| self.object_ray(&rays.get(lane)));
-        mesh.triangle_hits(lanes, &rays, hits, |lane, triangle| {
+        let wanted = colored || !self.material.flat;
+        mesh.triangle_hits(lanes, &rays, hits, wanted, |lane, triangle| {
             found |= 1 << lane;
             (0..3).for_each(|k| out.corners[k].set(lane, triangle.corners[k]));
             let a = triangle.attributes;

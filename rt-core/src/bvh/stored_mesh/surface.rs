@@ -24,17 +24,19 @@ impl StoredMesh {
         let hits = HitBlock { t: [hit.t; LANES], prim: [page; LANES], ..HitBlock::MISS };
         let hits = HitBlock { u: [hit.u; LANES], v: [hit.v; LANES], ..hits };
         let mut triangle = None;
-        self.triangle_hits(1, &[*ray; LANES], &hits, |_, found| triangle = Some(found));
+        self.triangle_hits(1, &[*ray; LANES], &hits, true, |_, found| triangle = Some(found));
         triangle
     }
 
     /// [`StoredMesh::triangle_hit`] of each of the `lanes`: pages are looked up once for all that
-    /// have hit them. `found` gets lanes in any order.
+    /// have hit them, and their attributes are read where they are `wanted`. `found` gets lanes in
+    /// any order.
     pub(crate) fn triangle_hits(
         &self,
         lanes: u16,
         rays: &[Ray; LANES],
         hits: &HitBlock,
+        wanted: bool,
         mut found: impl FnMut(usize, TriangleHit),
     ) {
         let places = recent_hits::find(self.key(), lanes, rays, hits);
@@ -44,7 +46,7 @@ impl StoredMesh {
             let same = set_bits(left).filter(|&l| hits.prim[l] == page);
             let same = same.fold(0u16, |lanes, l| lanes | 1 << l);
             left &= !same;
-            self.triangles_of_page(page, same, rays, hits, &places, &mut found);
+            self.triangles_of_page(page, same, rays, hits, wanted, &places, &mut found);
         }
     }
 
@@ -54,11 +56,11 @@ impl StoredMesh {
         lanes: u16,
         rays: &[Ray; LANES],
         hits: &HitBlock,
+        wanted: bool,
         places: &[TrianglePlace; LANES],
         found: &mut impl FnMut(usize, TriangleHit),
     ) {
-        const NONE: PageHit = PageHit::NONE;
-        let (mut triangles, mut known) = ([NONE; LANES], 0u16);
+        let (mut triangles, mut known) = ([PageHit::NONE; LANES], 0u16);
         self.with_page(page, |p| {
             p.triangles_at(self.level, lanes, places, |lane, triangle| {
                 known |= 1 << lane;
@@ -75,12 +77,14 @@ impl StoredMesh {
             }
         }
         let mut attributes = [HitAttributes::default(); LANES];
-        self.with_attributes(page, |all| {
-            for lane in set_bits(known) {
-                let (u, v) = (hits.u[lane], hits.v[lane]);
-                attributes[lane] = all.at(triangles[lane].id, [1.0 - u - v, u, v]);
-            }
-        });
+        if wanted {
+            self.with_attributes(page, |all| {
+                for lane in set_bits(known) {
+                    let (u, v) = (hits.u[lane], hits.v[lane]);
+                    attributes[lane] = all.at(triangles[lane].id, [1.0 - u - v, u, v]);
+                }
+            });
+        }
         for lane in set_bits(known) {
             let (corners, attributes) = (triangles[lane].corners, attributes[lane]);
             found(lane, TriangleHit { corners, attributes });

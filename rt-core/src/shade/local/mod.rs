@@ -202,9 +202,8 @@ fn fill_background(
     }
 }
 
-/// Radiance of one surface towards the viewer, or the origin of a ray with direction `dir`: the
-/// scalar form of
-/// [`light::radiance_block`].
+/// Radiance of one surface towards the viewer, or the origin of a ray with direction `dir`. The
+/// scalar form of [`light::radiance_block`].
 fn radiance(
     context: &FrameContext<'_>,
     material: &Material,
