@@ -7,6 +7,7 @@
 //! | [`isosurface`] | surfaces of uniform fields, with VTK's triangle counts |
 //! | [`contour`] | isosurfaces and plane sections of cells of any shape |
 //! | [`cache`] | disk cache of generated meshes |
+//! | [`free_memory`] | what this process can still take |
 //! | [`image_io`] | images as PNG and multi-layer OpenEXR |
 //! | [`colormaps`], [`view`] | colours and cameras |
 //! | [`resample`] | data of any mesh on a uniform lattice, with a mask and the error |
@@ -23,6 +24,7 @@ pub mod cli;
 pub mod colormaps;
 pub mod contour;
 mod delaunay;
+pub mod free_memory;
 pub mod generate;
 pub mod image_io;
 pub mod isosurface;

@@ -49,7 +49,6 @@ pub mod drawing;
 pub mod field;
 pub mod film;
 pub mod filter;
-mod free_memory;
 pub mod gas_on_cells;
 #[cfg(feature = "gpu")]
 pub mod gpu;

@@ -6,7 +6,7 @@
 //! field ends, there are as many nodes on both sides as on the shorter one.
 
 use super::{InputError, Options};
-use crate::free_memory::available_bytes;
+use datasets::free_memory::available_bytes;
 use datasets::model::{DataArray, Dataset, ImageData, Values};
 use datasets::read::volume_planes::VolumePlanes;
 use datasets::resample::Resolution;

@@ -2,8 +2,8 @@
 //! image has the same.
 
 use super::{RenderError, TestSection};
-use crate::free_memory::available_bytes;
 use crate::scene::{FlowSpec, MediaSpec, Scene, SolidsSpec};
+use datasets::free_memory::available_bytes;
 use std::path::Path;
 use std::thread::JoinHandle;
 use std::time::SystemTime;
