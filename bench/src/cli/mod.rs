@@ -1,6 +1,7 @@
 //! The command line: converts arguments to calls of the library.
 
 mod list;
+mod memory_budget;
 mod mesh_file;
 mod peers;
 mod quote;
@@ -71,8 +72,9 @@ struct RunArgs {
     /// Smaller data and fewer rounds: each experiment within a minute
     #[arg(long)]
     quick: bool,
-    /// The dissertation's own sizes (stored-files). Takes three quarters of an hour and up to 25 GB
-    /// on disk, asked for first; the files are kept in the cache (RTSV_CACHE) for the next run
+    /// The dissertation's own sizes: fig4.7, fig4.9, stored-files, memory-limit. Each takes up to
+    /// three quarters of an hour, stored-files up to 25 GB on disk, asked for first; its files are
+    /// kept in the cache (RTSV_CACHE) for the next run
     #[arg(long, conflicts_with = "quick")]
     thesis: bool,
     /// Also keep the records in bench/runs/DATE-MACHINE/. Rejected if the tree has uncommitted
@@ -140,7 +142,7 @@ struct StoreArgs {
     #[arg(long, conflicts_with = "color_by")]
     no_attributes: bool,
     /// Megabytes that small pieces of a mesh may take before they are written. More make faster
-    /// files [default: 1024]
+    /// files [default: 1024, or half of what is free where that is less]
     #[arg(long, value_name = "MB", value_parser = clap::value_parser!(u64).range(1..))]
     memory: Option<u64>,
 }
@@ -177,7 +179,7 @@ struct RenderArgs {
     #[arg(long, value_name = "EXR")]
     exr: Option<PathBuf>,
     /// Megabytes for the parts of a stored mesh or volume that are in memory at a time [default:
-    /// 1024]
+    /// 1024, or half of what is free where that is less]
     #[arg(long, value_name = "MB")]
     memory: Option<u64>,
     /// Pixels per row and rows

@@ -2,7 +2,7 @@
 //! ([`super::store_volume`]).
 
 use super::store_job::StoreJob;
-use super::{StoreArgs, store_isosurface, store_volume};
+use super::{StoreArgs, memory_budget, store_isosurface, store_volume};
 use crate::stored_data::{mixing_layer_pieces, wavelet_surfaces};
 use datasets::cli::{Cancel, CommonArgs, CureExt as _, UsageError};
 use datasets::isosurface::Options;
@@ -29,17 +29,13 @@ Examples:
   bench render ct.rtvolume --isovalue 300 -o bone.png --memory 900
   bench store --mixing-layer 2048 -o layer.rtvolume";
 
-/// Megabytes for small pieces, unless the user gives others.
-const DEFAULT_MEMORY: u64 = 1024;
-
 pub(super) fn store(common: CommonArgs, args: &StoreArgs) -> anyhow::Result<()> {
     if store_volume::is_meant(&args.out) {
         return store_volume::store(common, args);
     }
     let cancel = Cancel::on_ctrl_c()?;
     let start = Instant::now();
-    let memory = args.memory.unwrap_or(DEFAULT_MEMORY);
-    let memory = usize::try_from(memory).unwrap_or(usize::MAX).saturating_mul(1 << 20);
+    let memory = memory_budget::bytes(args.memory);
     let report = match (&args.file, args.wavelet, args.mixing_layer) {
         (Some(file), None, None) => store_file(common, args, file, memory, &cancel)?,
         (None, Some(millions), None) => store_wavelet(common, args, millions, memory, &cancel)?,

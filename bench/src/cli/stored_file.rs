@@ -1,6 +1,6 @@
 //! Files that `bench store` wrote as the file of `bench render`.
 
-use super::RenderArgs;
+use super::{RenderArgs, memory_budget};
 use crate::image::subject::{LoadOptions, Subject, VolumeChoice};
 use anyhow::Context as _;
 use datasets::cli::UsageError;
@@ -10,9 +10,6 @@ use serde_json::{Value, json};
 use std::io::Read as _;
 use std::path::Path;
 use std::sync::Arc;
-
-/// Megabytes for pages or bricks, unless the user gives others.
-const DEFAULT_MEMORY: u64 = 1024;
 
 /// An open file.
 pub(super) enum StoredFile {
@@ -29,8 +26,7 @@ pub(super) fn open(args: &RenderArgs, options: &LoadOptions) -> anyhow::Result<O
     let mut start = [0; 8];
     // Folders and files that cannot be read are the readers' to report.
     let read = std::fs::File::open(&args.file).and_then(|mut file| file.read_exact(&mut start));
-    let memory = args.memory.unwrap_or(DEFAULT_MEMORY);
-    let memory = usize::try_from(memory).unwrap_or(usize::MAX).saturating_mul(1 << 20);
+    let memory = memory_budget::bytes(args.memory);
     if read.is_ok() && StoredMesh::recognizes(&start) {
         return open_mesh(args, options, memory).map(|mesh| Some(StoredFile::Mesh(mesh)));
     }
