@@ -17,6 +17,7 @@ pub mod baselines;
 mod book;
 pub mod cli;
 pub mod clock;
+pub mod control_group;
 pub mod doubts;
 pub mod experiments;
 pub mod image;

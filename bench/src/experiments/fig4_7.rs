@@ -4,6 +4,7 @@
 
 use super::Context;
 use super::installed_tracers::InstalledBaselines;
+use super::wavelet_series::{PROGRAM, Step, has_room, steps};
 use crate::baselines::BuildCost;
 use crate::baselines::embree::{EmbreeScene, Options, Quality};
 use crate::baselines::obvhs::{Obvhs, Preset};
@@ -15,12 +16,34 @@ use crate::rt_core_tracer::RtCoreTracer;
 use crate::runner::{VERDICT_ROUNDS, order};
 use crate::stats::Summary;
 use datasets::generate::nested_wavelet::Size;
-use rt_core::bvh::{BuildOptions, BuildQuality};
+use rt_core::bvh::{BuildOptions, BuildQuality, Storage};
 use rt_core::mesh::TriMesh;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// A named builder.
-type Builder<'a> = (String, Box<dyn Fn() -> anyhow::Result<BuildCost> + 'a>);
+/// A builder of a tracer.
+struct Builder<'a> {
+    name: String,
+    build: Box<dyn Fn() -> anyhow::Result<BuildCost> + 'a>,
+    /// Bytes a triangle besides what its cost counts: a copy of the input.
+    copy: f64,
+    /// Whether it is measured however long it takes.
+    is_main: bool,
+}
+
+/// What a builder took for the mesh before, from which its cost of the next one is foreseen.
+#[derive(Clone, Copy)]
+struct Before {
+    triangles: usize,
+    secs: f64,
+    bytes_per_triangle: f64,
+}
+
+/// Other builders than the main ones are left out where a build would take longer, in seconds.
+const PATIENCE: f64 = 10.0;
+/// Builders that do not tell what they hold while they build are taken to hold so many times the
+/// result: obvhs has a binary tree, and boxes of all triangles, besides the wide tree.
+const WHILE_BUILDING: f64 = 3.0;
 
 pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
     record.column("triangles", "", "triangles of the wavelet surfaces");
@@ -55,106 +78,175 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
          build that is needed once."
             .into(),
     );
-    let with = Baselines { installed: &installed, mesa: mesa.as_ref() };
+    let mut series =
+        BuildSeries { installed: &installed, mesa: mesa.as_ref(), before: BTreeMap::new() };
+    if context.thesis {
+        record.notes.push("The sizes of the dissertation (--thesis).".into());
+    }
     if context.quick {
         for points in [51, 101] {
             let mesh = meshes::coarse_wavelet(points)?;
-            measure(context, record, &with, &mesh, 3, false)?;
+            series.measure(context, record, &mesh, 3)?;
         }
         let mesh = context.wavelet(Size::M1)?;
-        measure(context, record, &with, &mesh, 2, false)?;
+        series.measure(context, record, &mesh, 2)?;
     } else {
-        for size in Size::ALL {
-            if fits_in_memory(size, record) {
-                let mesh = context.wavelet(size)?;
-                // Slow builders are omitted where they would take minutes each.
-                let small = size <= Size::M4;
-                measure(context, record, &with, &mesh, VERDICT_ROUNDS, small)?;
-            }
+        for step in steps(context.thesis) {
+            let mesh = match step.mesh(context)? {
+                Ok(mesh) => mesh,
+                Err(why) => {
+                    record.missing.push(why);
+                    continue;
+                }
+            };
+            // A round of the large meshes takes minutes.
+            let rounds = if step > Step::Named(Size::M32) { 3 } else { VERDICT_ROUNDS };
+            series.measure(context, record, &mesh, rounds)?;
         }
     }
     record.plots.push(plot(record));
     Ok(())
 }
 
-/// The baselines for our builds.
-struct Baselines<'a> {
+/// Builders, and what they took for the mesh before.
+struct BuildSeries<'a> {
     installed: &'a InstalledBaselines,
     mesa: Option<&'a Mesa>,
+    before: BTreeMap<String, Before>,
 }
 
-/// Builds one mesh with all builders in alternation.
-fn measure(
-    context: &mut Context<'_>,
-    record: &mut Record,
-    with: &Baselines<'_>,
-    mesh: &Arc<TriMesh>,
-    rounds: usize,
-    slow_too: bool,
-) -> anyhow::Result<()> {
-    let n = mesh.num_triangles();
-    let builders = builders(mesh, with.installed, slow_too);
-    let mut costs: Vec<Vec<BuildCost>> = vec![vec![]; builders.len()];
-    context.report_step(format!("{n} triangles: a program for llvmpipe"))?;
-    let mut drawn: Option<MesaFrames> = None;
-    if let Some(mesa) = with.mesa {
-        drawn = mesa
-            .draw(mesh, 1024)
-            .map_err(|e| record.missing.push(format!("{n} triangles: {e:#}")))
-            .ok();
-    }
-    for round in 0..rounds {
-        context.report_step(format!("{n} triangles, round {} of {rounds}", round + 1))?;
-        for i in order(builders.len() + 1, round) {
-            match (builders.get(i), &mut drawn) {
-                (Some((_, build)), _) => costs[i].push(build()?),
-                (None, Some(frames)) => frames.take(FRAMES_PER_ROUND)?,
-                (None, None) => {}
+impl BuildSeries<'_> {
+    /// Builds one mesh with all builders in alternation.
+    fn measure(
+        &mut self,
+        context: &mut Context<'_>,
+        record: &mut Record,
+        mesh: &Arc<TriMesh>,
+        rounds: usize,
+    ) -> anyhow::Result<()> {
+        let n = mesh.num_triangles();
+        let mut builders = builders(mesh, self.installed);
+        builders.retain(|builder| match self.foreseen(builder, n) {
+            Ok(()) => true,
+            Err(why) => {
+                record.missing.push(format!("{n} triangles: {} {why}", builder.name));
+                false
+            }
+        });
+        let mut costs: Vec<Vec<BuildCost>> = vec![vec![]; builders.len()];
+        let mut drawn = self.program(context, record, mesh)?;
+        for round in 0..rounds {
+            for i in order(builders.len() + 1, round) {
+                let now = builders.get(i).map_or("llvmpipe", |b| &b.name);
+                context.report_step(format!(
+                    "{n} triangles, round {} of {rounds}: {now}",
+                    round + 1
+                ))?;
+                match (builders.get(i), &mut drawn) {
+                    (Some(builder), _) => costs[i].push((builder.build)()?),
+                    (None, Some(frames)) => frames.take(FRAMES_PER_ROUND)?,
+                    (None, None) => {}
+                }
             }
         }
+        for (builder, costs) in builders.iter().zip(&costs) {
+            record.rows.push(row(&builder.name, mesh, costs));
+            let secs = Summary::of(&costs.iter().map(|c| c.wall_secs).collect::<Vec<_>>());
+            let bytes = costs.iter().map(|c| {
+                c.peak_bytes.map_or(WHILE_BUILDING * c.bytes as f64, |b| b.max(c.bytes) as f64)
+            });
+            let most = bytes.fold(0.0, f64::max) / n as f64;
+            let bytes_per_triangle = most + builder.copy;
+            let secs = secs.map_or(0.0, |s| s.median);
+            let before = Before { triangles: n, secs, bytes_per_triangle };
+            self.before.insert(builder.name.clone(), before);
+        }
+        if let Some(frames) = drawn {
+            let row = Row::new()
+                .with("triangles", n)
+                .with("builder", format!("a frame of {}", frames.name()));
+            record.rows.push(frames.end(row, 1.0)?);
+        }
+        Ok(())
     }
-    for ((name, _), costs) in builders.iter().zip(&costs) {
-        record.rows.push(row(name, mesh, costs));
+
+    /// Whether a builder has the memory and the time for a mesh of `n` triangles.
+    fn foreseen(&self, builder: &Builder<'_>, n: usize) -> Result<(), String> {
+        let Some(before) = self.before.get(&builder.name) else {
+            return if self.before.is_empty() {
+                Ok(())
+            } else {
+                Err("was left out of a smaller mesh".into())
+            };
+        };
+        has_room(before.bytes_per_triangle * n as f64)?;
+        let secs = before.secs * n as f64 / before.triangles as f64;
+        if builder.is_main || secs <= PATIENCE {
+            return Ok(());
+        }
+        Err(format!("would take about {secs:.0} s, and is measured up to {PATIENCE} s"))
     }
-    if let Some(frames) = drawn {
-        let row = Row::new()
-            .with("triangles", n)
-            .with("builder", format!("a frame of {}", frames.name()));
-        record.rows.push(frames.end(row, 1.0)?);
+
+    /// A program that draws the mesh by llvmpipe.
+    fn program(
+        &self,
+        context: &mut Context<'_>,
+        record: &mut Record,
+        mesh: &Arc<TriMesh>,
+    ) -> anyhow::Result<Option<MesaFrames>> {
+        let n = mesh.num_triangles();
+        context.report_step(format!("{n} triangles: a program for llvmpipe"))?;
+        let drawn = self.mesa.map(|mesa| {
+            has_room(PROGRAM * n as f64).map_err(|why| format!("a program for llvmpipe {why}"))?;
+            mesa.draw(mesh, 1024).map_err(|e| format!("{e:#}"))
+        });
+        let drawn = drawn.transpose();
+        Ok(drawn.map_err(|why| record.missing.push(format!("{n} triangles: {why}"))).ok().flatten())
     }
-    Ok(())
 }
 
 /// Frames per round: a frame is short compared with the builds of its round.
 const FRAMES_PER_ROUND: usize = 3;
 
-fn builders<'a>(
-    mesh: &'a Arc<TriMesh>,
-    installed: &'a InstalledBaselines,
-    slow_too: bool,
-) -> Vec<Builder<'a>> {
+fn builders<'a>(mesh: &'a Arc<TriMesh>, installed: &'a InstalledBaselines) -> Vec<Builder<'a>> {
     let mut list: Vec<Builder<'a>> = vec![];
-    for quality in BuildQuality::ALL {
-        if quality == BuildQuality::Best && !slow_too {
-            continue;
-        }
-        let options = BuildOptions { quality, ..Default::default() };
-        let build = move || Ok(RtCoreTracer::build(mesh, &options)?.cost);
-        list.push((format!("rt-core {}", quality.name()), Box::new(build)));
+    let ours = [
+        (BuildQuality::Fast, Storage::Plain),
+        (BuildQuality::Balanced, Storage::Plain),
+        (BuildQuality::Balanced, Storage::Compact),
+        (BuildQuality::Best, Storage::Plain),
+    ];
+    for (quality, storage) in ours {
+        let options = BuildOptions { quality, storage, ..Default::default() };
+        let compact = if storage == Storage::Compact { ", compact" } else { "" };
+        list.push(Builder {
+            name: format!("rt-core {}{compact}", quality.name()),
+            build: Box::new(move || Ok(RtCoreTracer::build(mesh, &options)?.cost)),
+            copy: 0.0,
+            is_main: quality != BuildQuality::Best,
+        });
     }
     for e in &installed.embree {
-        for quality in Quality::ALL {
-            if quality != Quality::High || slow_too {
-                let options = Options { quality, robust: true, ..Default::default() };
-                let build = move || Ok(EmbreeScene::build(e, mesh, &options)?.cost);
-                list.push((format!("{} {}", e.name(), quality.name()), Box::new(build)));
-            }
+        let ways = Quality::ALL.into_iter().map(|q| (q, false)).chain([(Quality::Medium, true)]);
+        for (quality, compact) in ways {
+            let options = Options { quality, compact, robust: true, ..Default::default() };
+            let in_words = if compact { ", compact" } else { "" };
+            list.push(Builder {
+                name: format!("{} {}{in_words}", e.name(), quality.name()),
+                build: Box::new(move || Ok(EmbreeScene::build(e, mesh, &options)?.cost)),
+                // Positions and indices.
+                copy: 18.0,
+                is_main: quality != Quality::High,
+            });
         }
     }
-    let presets = if slow_too { &Preset::ALL[..] } else { &[Preset::Fastest, Preset::Medium] };
-    for &preset in presets {
-        let build = move || Ok(Obvhs::build(mesh, preset)?.cost);
-        list.push((format!("obvhs {}", preset.name()), Box::new(build)));
+    for preset in Preset::ALL {
+        list.push(Builder {
+            name: format!("obvhs {}", preset.name()),
+            build: Box::new(move || Ok(Obvhs::build(mesh, preset)?.cost)),
+            copy: 0.0,
+            is_main: false,
+        });
     }
     list
 }
@@ -176,22 +268,6 @@ fn row(name: &str, mesh: &TriMesh, costs: &[BuildCost]) -> Row {
         .with("rate", n / wall.median / 1e6)
         .with("bytes_per_triangle", cost.bytes as f64 / n)
         .with("peak_bytes_per_triangle", cost.peak_bytes.map(|b| b as f64 / n))
-}
-
-/// Checks that a size fits in memory; otherwise reports it in the record. The largest sizes need up
-/// to 400 bytes per triangle while building.
-pub(super) fn fits_in_memory(size: Size, record: &mut Record) -> bool {
-    let needed_gib = size.triangles() as f64 * 400.0 / (1u64 << 30) as f64;
-    let there_gib = record.machine.memory_gib;
-    let fits = there_gib == 0.0 || needed_gib < 0.8 * there_gib;
-    if !fits {
-        record.missing.push(format!(
-            "{} triangles: building needs about {needed_gib:.0} GiB and this machine has \
-             {there_gib:.0} GiB",
-            size.name()
-        ));
-    }
-    fits
 }
 
 fn plot(record: &Record) -> Plot {

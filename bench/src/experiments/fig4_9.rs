@@ -2,7 +2,7 @@
 //! a headlight, and with frames of Mesa's rasteriser.
 
 use super::Context;
-use super::fig4_7::fits_in_memory;
+use super::wavelet_series::{PROGRAM, Step, has_room, steps};
 use crate::clock::{Clock, Sample};
 use crate::image::framing::Framing;
 use crate::opengl::{Mesa, MesaFrames};
@@ -10,20 +10,21 @@ use crate::plot::{Axis, Plot, Point, Series};
 use crate::record::{Record, Row};
 use crate::runner::{Schedule, Variant, interleave};
 use datasets::catalogue;
-use datasets::generate::nested_wavelet::Size;
-use rt_core::bvh::{BuildOptions, World};
+use rt_core::bvh::{BuildOptions, Storage, World};
 use rt_core::camera::Camera;
+use rt_core::mesh::TriMesh;
 use rt_core::render::{RenderOptions, render};
 use rt_core::scene::Scene;
 use std::cell::RefCell;
+use std::sync::Arc;
 
 pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
     record.column("triangles", "", "triangles of the wavelet surfaces");
     record.column(
         "view",
         "",
-        "view of the data set; `llvmpipe`: the whole of it, turning, drawn by an unmodified \
-         program",
+        "view of the data set, by a plain tree or a compact one; `llvmpipe`: the whole of it, \
+         turning, drawn by an unmodified program",
     );
     record.column("pixels", "", "pixels of the frame, one primary ray each");
     record.column("covered", "", "pixels that show a surface");
@@ -52,11 +53,15 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
             .into(),
     );
     let mesa = Mesa::find().map_err(|missing| record.missing.extend(missing)).ok();
-    let sizes = if context.quick { &[Size::M1, Size::M2, Size::M4][..] } else { &Size::ALL[..] };
+    if context.thesis {
+        record.notes.push("The sizes of the dissertation (--thesis).".into());
+    }
     let pixels = if context.quick { 512 } else { 1024 };
-    for &size in sizes {
-        if fits_in_memory(size, record) {
-            measure(context, record, mesa.as_ref(), size, pixels)?;
+    let all = steps(context.thesis);
+    for &step in if context.quick { &all[..3] } else { &all[..] } {
+        match step.mesh(context)? {
+            Ok(mesh) => measure(context, record, mesa.as_ref(), step, &mesh, pixels)?,
+            Err(why) => record.missing.push(why),
         }
     }
     record.notes.extend(describe_growth(record));
@@ -64,62 +69,103 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     Ok(())
 }
 
-/// Describes how the time of each view grew from the smallest to the largest number of triangles.
+/// Describes how the time of each view grew from its smallest to its largest number of triangles:
+/// a renderer that takes more memory ends before the others.
 fn describe_growth(record: &Record) -> Option<String> {
-    let mut words = vec![];
-    for series in &plot(record).series {
+    let series = plot(record).series;
+    let words = series.iter().filter_map(|series| {
         let (first, last) = (series.points.first()?, series.points.last()?);
-        if first.x < last.x {
-            words.push(format!("{} {:.2} times", series.name, last.y / first.y));
-        }
-    }
-    let ends = plot(record)
-        .series
-        .first()
-        .and_then(|s| Some((s.points.first()?.x, s.points.last()?.x)))?;
-    let more = ends.1 / ends.0;
+        let (more, longer) = (last.x / first.x, last.y / first.y);
+        (more > 1.0).then(|| {
+            format!(
+                "{} {longer:.2} times with {more:.0} times as many ({:.0} million)",
+                series.name,
+                last.x / 1e6
+            )
+        })
+    });
+    let words: Vec<String> = words.collect();
     (!words.is_empty()).then(|| {
-        format!(
-            "From {} to {} triangles, {more:.1} times as many, the time of a frame grew: {}.",
-            ends.0,
-            ends.1,
-            words.join(", ")
-        )
+        format!("From the smallest mesh on, the time of a frame grew: {}.", words.join("; "))
     })
+}
+
+/// Bytes a triangle of a tree while it is built (figure 4.7).
+fn bytes_while_building(storage: Storage) -> f64 {
+    match storage {
+        Storage::Plain => 64.0,
+        Storage::Compact => 30.0,
+    }
+}
+
+/// The mesh with a tree of one kind.
+struct Built {
+    storage: Storage,
+    scene: Scene,
+    build_secs: f64,
+    bytes: usize,
+}
+
+/// The mesh with a tree of each kind that there is room for.
+fn built(
+    context: &mut Context<'_>,
+    record: &mut Record,
+    mesh: &Arc<TriMesh>,
+) -> anyhow::Result<Vec<Built>> {
+    let n = mesh.num_triangles();
+    let mut all = vec![];
+    for storage in Storage::ALL {
+        let name = storage.name();
+        context.report_step(format!("{n} triangles: building, {name}"))?;
+        if let Err(why) = has_room(bytes_while_building(storage) * n as f64) {
+            record.missing.push(format!("{n} triangles: a {name} tree {why}"));
+            continue;
+        }
+        let options = BuildOptions { storage, ..BuildOptions::default() };
+        let scene = Scene::new(World::from_mesh(mesh.clone(), &options)?);
+        let report = scene.world.report();
+        let (build_secs, bytes) = (report.total.as_secs_f64(), report.bytes);
+        all.push(Built { storage, scene, build_secs, bytes });
+    }
+    Ok(all)
 }
 
 fn measure(
     context: &mut Context<'_>,
     record: &mut Record,
     mesa: Option<&Mesa>,
-    size: Size,
+    step: Step,
+    mesh: &Arc<TriMesh>,
     pixels: u32,
 ) -> anyhow::Result<()> {
-    let mesh = context.wavelet(size)?;
-    context.report_step(format!("{} triangles: building", mesh.num_triangles()))?;
-    let scene = Scene::new(World::from_mesh(mesh.clone(), &BuildOptions::default())?);
-    let report = scene.world.report();
-    let (build_secs, bytes) = (report.total.as_secs_f64(), report.bytes);
+    let built = built(context, record, mesh)?;
     let options = RenderOptions::new(pixels, pixels);
     let n = mesh.num_triangles();
     let mut drawn: Option<MesaFrames> = None;
     if let Some(mesa) = mesa {
         context.report_step(format!("{n} triangles: a program for llvmpipe"))?;
-        drawn = mesa
-            .draw(&mesh, pixels)
-            .map_err(|e| record.missing.push(format!("{n} triangles: {e:#}")))
-            .ok();
+        let room = has_room(PROGRAM * step.triangles() as f64);
+        let room = room.map_err(|why| format!("a program for llvmpipe {why}"));
+        let started = room.and_then(|()| mesa.draw(mesh, pixels).map_err(|e| format!("{e:#}")));
+        drawn = started.map_err(|why| record.missing.push(format!("{n} triangles: {why}"))).ok();
     }
-    let mut cameras: Vec<(String, Camera)> = vec![];
-    for view in catalogue::find("wavelet")?.views() {
-        cameras.push((view.name.clone(), Framing::At(view).of(&scene.world, [pixels, pixels])?));
+    let mut pictures: Vec<(String, &Built, Camera)> = vec![];
+    for one in &built {
+        for view in catalogue::find("wavelet")?.views() {
+            let name = match one.storage {
+                Storage::Plain => view.name.clone(),
+                Storage::Compact => format!("{}, compact", view.name),
+            };
+            let camera = Framing::At(view).of(&one.scene.world, [pixels, pixels])?;
+            pictures.push((name, one, camera));
+        }
     }
     context.report_step(format!("{n} triangles: frames in turns"))?;
     let failed: RefCell<Option<anyhow::Error>> = RefCell::new(None);
-    let mut variants: Vec<Variant<'_>> = cameras
+    let mut variants: Vec<Variant<'_>> = pictures
         .iter()
-        .map(|(name, camera)| {
-            let (scene, options, failed) = (&scene, &options, &failed);
+        .map(|(name, one, camera)| {
+            let (scene, options, failed) = (&one.scene, &options, &failed);
             Variant::new(name.as_str(), move || match render(scene, camera, options) {
                 Ok(o) => o.frame.color.iter().filter(|c| c[3] > 0.0).count() as u64,
                 Err(e) => {
@@ -150,15 +196,15 @@ fn measure(
             Row::new().with("triangles", n).with("view", timed.name.as_str()).with("pixels", rays);
         let row = row.with("time", wall.median * 1e3).with("time_low", wall.low * 1e3);
         let row = row.with("time_high", wall.high * 1e3).with("cpu", cpu.median * 1e3);
-        let is_ours = cameras.iter().any(|(name, _)| *name == timed.name);
-        record.rows.push(if is_ours {
-            row.with("covered", timed.check)
+        let ours = pictures.iter().find(|(name, ..)| *name == timed.name);
+        record.rows.push(match ours {
+            Some((_, one, _)) => row
+                .with("covered", timed.check)
                 .with("threads", rayon::current_num_threads())
                 .with("rate", rays / wall.median / 1e6)
-                .with("build", build_secs)
-                .with("bytes_per_triangle", bytes as f64 / n as f64)
-        } else {
-            row
+                .with("build", one.build_secs)
+                .with("bytes_per_triangle", one.bytes as f64 / n as f64),
+            None => row,
         });
     }
     if let Some(frames) = drawn {

@@ -33,6 +33,7 @@ mod in_situ;
 mod installed_tracers;
 mod many_meshes;
 mod many_ranks;
+mod memory_limit;
 mod paraview;
 mod partition_view;
 mod pictures;
@@ -50,6 +51,7 @@ mod strong_scaling;
 mod table4_1;
 mod table5_1;
 mod test_section;
+mod wavelet_series;
 
 use crate::machine::Machine;
 use crate::meshes::MeshScene;
@@ -75,7 +77,7 @@ pub struct Experiment {
 }
 
 /// The experiments that have the dissertation's own sizes ([`Context::thesis`]).
-pub const WITH_THESIS_SIZES: &[&str] = &["stored-files"];
+pub const WITH_THESIS_SIZES: &[&str] = &["fig4.7", "fig4.9", "stored-files", "memory-limit"];
 
 /// All experiments, in the order of the report.
 pub const ALL: &[Experiment] = &[
@@ -183,6 +185,12 @@ pub const ALL: &[Experiment] = &[
         chapter: 4,
         title: "Data in files that may be larger than memory: preparing, opening and drawing them",
         run: stored_files::run,
+    },
+    Experiment {
+        id: "memory-limit",
+        chapter: 4,
+        title: "Frames of a stored mesh by a program that may hold a quarter of the file",
+        run: memory_limit::run,
     },
     Experiment {
         id: "effects",
