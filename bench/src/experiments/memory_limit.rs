@@ -180,11 +180,14 @@ impl Scene<'_> {
         command.args(["--size", &format!("{0}x{0}", self.pixels)]);
         command.args(["--samples", &PASSES.to_string(), "--json", "--quiet"]);
         let output = command.stdin(Stdio::null()).output()?;
-        let failed = || format!("bench render: {}", String::from_utf8_lossy(&output.stderr));
-        anyhow::ensure!(output.status.success(), "{}: {}", output.status, failed());
-        let said: Value = serde_json::from_slice(&output.stdout).with_context(failed)?;
-        let secs = said["seconds"]["render"].as_f64().with_context(failed)?;
-        let reads = said["stored"]["reads"].as_u64().with_context(failed)?;
+        let said = || {
+            let [out, err] = [&output.stdout, &output.stderr].map(|b| String::from_utf8_lossy(b));
+            format!("bench render: {}: {out}{err}", output.status)
+        };
+        anyhow::ensure!(output.status.success(), said());
+        let object: Value = serde_json::from_slice(&output.stdout).with_context(said)?;
+        let secs = object["seconds"]["render"].as_f64().with_context(said)?;
+        let reads = object["stored"]["page_reads"].as_u64().with_context(said)?;
         Ok(Drawn { secs, image: std::fs::read(&png)?, reads })
     }
 }
