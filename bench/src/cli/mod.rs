@@ -72,9 +72,9 @@ struct RunArgs {
     /// Smaller data and fewer rounds: each experiment within a minute
     #[arg(long)]
     quick: bool,
-    /// The dissertation's own sizes: fig4.7, fig4.9, stored-files, memory-limit. Each takes up to
-    /// three quarters of an hour, stored-files up to 25 GB on disk, asked for first; its files are
-    /// kept in the cache (RTSV_CACHE) for the next run
+    /// The dissertation's own sizes: fig3.6, table4.1, fig4.7, fig4.9, stored-files, memory-limit.
+    /// Each takes up to three quarters of an hour, stored-files up to 25 GB on disk, asked for
+    /// first; its files are kept in the cache (RTSV_CACHE) for the next run
     #[arg(long, conflicts_with = "quick")]
     thesis: bool,
     /// Also keep the records in bench/runs/DATE-MACHINE/. Rejected if the tree has uncommitted

@@ -60,7 +60,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     program_ranks::run(context, record)?;
     let mut plot =
         Plot::lines("Sharing", Axis::log("ranks", ""), Axis::log("time of a frame", "ms"));
-    for name in ["replicated", "parts", program_ranks::SHARING] {
+    for name in ["replicated", "parts"].into_iter().chain(program_ranks::SHARING) {
         for (column, of_what) in [("frame", ""), ("render_max", ", slowest rank’s render")] {
             let of = record.rows.iter().filter(|r| r.text("sharing") == Some(name));
             let points = of.filter_map(|r| r.number("ranks").zip(r.number(column))).collect();

@@ -1,7 +1,7 @@
 //! Figure 4.8: a timeline of ray traced frames of ParaView.
 
 use super::Context;
-use crate::opengl::{Backend, Display, Program, Session, Tools, write};
+use crate::opengl::{Backend, Display, Drawing, Program, Session, Tools, write};
 use crate::record::{Attachment, Record, Row};
 use crate::stats::Summary;
 use anyhow::Context as _;
@@ -32,7 +32,8 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     };
     let (mesh, frames) = match context.quick {
         true => (crate::meshes::coarse_wavelet(51)?, 10),
-        false => (context.wavelet(Size::M1)?, 40),
+        // As in the dissertation.
+        false => (context.wavelet(Size::M8)?, 40),
     };
     record.notes.push(format!(
         "pvbatch turns a camera around {} triangles for {frames} frames through `gluray run`; the \
@@ -51,8 +52,7 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         Some(&tools.gluray),
         &display,
         &dir.path().join("run"),
-        &data,
-        1024,
+        Drawing { data: &data, size_px: 1024, view: None },
     )?;
     context.report_step("frames")?;
     session.frames(frames)?;

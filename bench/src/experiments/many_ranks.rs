@@ -109,25 +109,41 @@ pub(super) fn frames(
     sharing: Sharing,
     options: &FrameOptions,
 ) -> anyhow::Result<Frames> {
+    frames_of(ranks, frames, options, |comm, options| {
+        let mut renderer = match sharing {
+            Sharing::SortLast => {
+                let built = BuildOptions::default();
+                let part = prepared.partition.part(&prepared.scene, comm.rank(), &built)?;
+                Some(DataParallel::new(comm, part, options.clone())?)
+            }
+            Sharing::RayParallel => None,
+        };
+        let options = options.clone();
+        Ok(move |comm: &mut SimComm| {
+            let PreparedDemo { scene, camera, options: render, .. } = prepared;
+            Ok(match &mut renderer {
+                Some(renderer) => renderer.frame(comm, camera, render)?,
+                None => ray_parallel(comm, scene, camera, render, &options)?,
+            })
+        })
+    })
+}
+
+/// Renders one warm-up frame and `frames` counted frames on `ranks` simulated ranks, each by what
+/// `begin` makes of its communicator.
+pub(super) fn frames_of<F>(
+    ranks: usize,
+    frames: usize,
+    options: &FrameOptions,
+    begin: impl Fn(&mut SimComm, &FrameOptions) -> anyhow::Result<F> + Sync,
+) -> anyhow::Result<Frames>
+where
+    F: FnMut(&mut SimComm) -> anyhow::Result<FrameOutput>,
+{
     let outputs = run_on(ranks, NETWORK, Compute::Measured(1.0), 1, |mut comm| {
         let options = FrameOptions { timeout: TIMEOUT, ..options.clone() };
-        match sharing {
-            Sharing::SortLast => {
-                let part = prepared.partition.part(
-                    &prepared.scene,
-                    comm.rank(),
-                    &BuildOptions::default(),
-                )?;
-                let mut renderer = DataParallel::new(&mut comm, part, options)?;
-                measure_frames(&mut comm, frames, |comm| {
-                    Ok(renderer.frame(comm, &prepared.camera, &prepared.options)?)
-                })
-            }
-            Sharing::RayParallel => measure_frames(&mut comm, frames, |comm| {
-                let PreparedDemo { scene, camera, options: render, .. } = prepared;
-                Ok(ray_parallel(comm, scene, camera, render, &options)?)
-            }),
-        }
+        let frame = begin(&mut comm, &options)?;
+        measure_frames(&mut comm, frames, frame)
     });
     let mut reports: Vec<Vec<RankReport>> = Vec::with_capacity(ranks);
     for output in outputs {

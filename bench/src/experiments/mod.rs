@@ -77,7 +77,8 @@ pub struct Experiment {
 }
 
 /// The experiments that have the dissertation's own sizes ([`Context::thesis`]).
-pub const WITH_THESIS_SIZES: &[&str] = &["fig4.7", "fig4.9", "stored-files", "memory-limit"];
+pub const WITH_THESIS_SIZES: &[&str] =
+    &["fig3.6", "table4.1", "fig4.7", "fig4.9", "stored-files", "memory-limit"];
 
 /// All experiments, in the order of the report.
 pub const ALL: &[Experiment] = &[

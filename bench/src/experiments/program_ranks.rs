@@ -2,18 +2,39 @@
 //! OpenGL program.
 
 use super::Context;
-use crate::opengl::{Backend, Display, Program, Session, Tools, write};
+use crate::opengl::{Backend, Display, Drawing, Program, Session, Tools, write};
 use crate::record::{Record, Row};
 use crate::runner::order;
 use crate::stats::Summary;
+use datasets::catalogue::{self, Data};
 use datasets::generate::nested_wavelet::Size;
+use datasets::isosurface::Options;
+use std::sync::Arc;
 
 /// Width and height of the program's window.
 const SIZE_PX: u32 = 1024;
-/// VTK in Python, which can write the contents of its window.
-const PROGRAM: Program = Program::Vtk;
-/// Value of these rows in the column `sharing`.
-pub(super) const SHARING: &str = "gluray";
+/// A program, what it draws, and the value of its rows in the column `sharing`.
+struct Case {
+    program: Program,
+    /// A data set and its size; `None` for the wavelet's surfaces of a million triangles.
+    data: Option<(&'static str, &'static str)>,
+    /// Numbers of ranks. Each is a program and its helpers, all of which have the data.
+    ranks: &'static [u32],
+    sharing: &'static str,
+}
+
+/// The programs: VTK in Python, and ParaView with the layer of the dissertation's figure.
+const CASES: [Case; 2] = [
+    Case { program: Program::Vtk, data: None, ranks: &[1, 2, 4, 8, 16], sharing: SHARING[0] },
+    Case {
+        program: Program::ParaView,
+        data: Some(("mixing-layer", "medium")),
+        ranks: &[1, 2, 4],
+        sharing: SHARING[1],
+    },
+];
+/// Values of the column `sharing`.
+pub(super) const SHARING: [&str; 2] = ["gluray", "gluray, ParaView"];
 
 pub(super) fn columns(record: &mut Record) {
     record.column("rays_mean", "Mray", "gluray: rays of a rank in a frame, mean over the ranks");
@@ -30,49 +51,69 @@ pub(super) fn columns(record: &mut Record) {
     );
 }
 
-/// Adds the rows of the program; if it or its tools are missing, adds it to the missing parts.
+/// Adds the rows of the programs; what is missing for one is added to the missing parts.
 pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
-    let tools = match (Tools::find(), PROGRAM.find()) {
+    record.notes.push(format!(
+        "`gluray`: a program in a window of {SIZE_PX} x {SIZE_PX} pixels, through `gluray run \
+         --mode match --ranks N`: VTK in Python with the wavelet, and ParaView with the \
+         Richtmyer-Meshkov-like layer from outside. Its ranks are real processes on the cores of \
+         this machine, which they share: one rank has all cores, more have their part of them, so \
+         wall time shows what sharing costs and not what more machines would gain. `render` is \
+         wall time there, of a rank's share of a frame."
+    ));
+    for case in &CASES {
+        // The quick form has one program.
+        if case.data.is_none() || !context.quick {
+            measure(context, record, case)?;
+        }
+    }
+    Ok(())
+}
+
+fn measure(context: &mut Context<'_>, record: &mut Record, case: &Case) -> anyhow::Result<()> {
+    let program = case.program;
+    let tools = match (Tools::find(), program.find()) {
         (Ok(tools), Ok(_)) => tools,
         (tools, program) => {
             record.missing.extend(tools.err().into_iter().flatten().chain(program.err()));
             return Ok(());
         }
     };
-    record.notes.push(format!(
-        "`{SHARING}`: {} in a window of {SIZE_PX} x {SIZE_PX} pixels, through `gluray run --mode \
-         match --ranks N`. Its ranks are real processes on the cores of this \
-         machine, which they share: one rank has all cores, more have their part of them, so wall \
-         time shows what sharing costs and not what more machines would gain. `render` is wall \
-         time there, of a rank's share of a frame.",
-        PROGRAM.name()
-    ));
     let display = Display::start(&tools.xvfb)?;
     let dir = tempfile::tempdir()?;
     let (counts, groups, frames): (&[u32], u32, u32) =
-        if context.quick { (&[1, 2, 4], 2, 3) } else { (&[1, 2, 4, 8, 16], 5, 4) };
-    let mesh = if context.quick {
-        crate::meshes::coarse_wavelet(51)?
-    } else {
-        context.wavelet(Size::M1)?
+        if context.quick { (&[1, 2, 4], 2, 3) } else { (case.ranks, 5, 4) };
+    let (mesh, view) = match case.data {
+        _ if context.quick => (crate::meshes::coarse_wavelet(51)?, None),
+        None => (context.wavelet(Size::M1)?, None),
+        Some((name, size)) => {
+            let entry = catalogue::find(name)?;
+            context.report_step(format!("making {name}, {size}"))?;
+            let options = Options { normals: true, scalars: false };
+            match entry.generate(size, options, &mut |_, _| true)? {
+                Data::Mesh(mesh) => (Arc::new(mesh), entry.views().into_iter().next()),
+                Data::Lines(_) => anyhow::bail!("{name} has no triangles"),
+            }
+        }
     };
-    let data = dir.path().join("wavelet").with_extension(PROGRAM.format().extension());
-    write(&mesh, PROGRAM.format(), &data)?;
+    let data = dir.path().join("data").with_extension(program.format().extension());
+    write(&mesh, program.format(), &data)?;
+    let drawing = Drawing { data: &data, size_px: SIZE_PX, view: view.as_ref() };
 
     // ---- All numbers of ranks run concurrently and alternate ----
     let mut sessions = Vec::new();
     for &ranks in counts {
-        context.report_step(format!("{}, {ranks} ranks: starting", PROGRAM.name()))?;
+        context.report_step(format!("{}, {ranks} ranks: starting", program.name()))?;
         let own = dir.path().join(format!("ranks{ranks}"));
         let backend = Backend::Ranks(ranks);
         let mut session =
-            Session::start(PROGRAM, backend, Some(&tools.gluray), &display, &own, &data, SIZE_PX)?;
+            Session::start(program, backend, Some(&tools.gluray), &display, &own, drawing)?;
         session.frames(3)?;
         sessions.push(session);
     }
     let mut times = vec![Vec::new(); counts.len()];
     for round in 0..groups {
-        context.report_step(format!("{}: group {} of {groups}", PROGRAM.name(), round + 1))?;
+        context.report_step(format!("{}: group {} of {groups}", program.name(), round + 1))?;
         for i in order(counts.len(), round as usize) {
             times[i].push(sessions[i].frames(frames)?.wall_secs / f64::from(frames));
         }
@@ -89,12 +130,13 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         let why = &reports[0]["passed_reasons"];
         record.missing.push(format!(
             "{}: gluray traces nothing of this version of it ({why})",
-            PROGRAM.name()
+            program.name()
         ));
         return Ok(());
     }
     for (i, (report, &ranks)) in reports.iter().zip(counts).enumerate() {
-        record.rows.push(row(ranks, &times[i], report, differing(&images[0], &images[i]))?);
+        let row = row(ranks, &times[i], report, differing(&images[0], &images[i]))?;
+        record.rows.push(row.with("sharing", case.sharing));
     }
     Ok(())
 }
@@ -116,7 +158,6 @@ fn row(ranks: u32, secs: &[f64], report: &serde_json::Value, differ: usize) -> a
     let most = |values: &[f64]| values.iter().copied().fold(0.0, f64::max);
     let time = Summary::of(secs).ok_or_else(|| anyhow::anyhow!("no frames"))?;
     let mut row = Row::new()
-        .with("sharing", SHARING)
         .with("ranks", ranks)
         .with("frame", time.median * 1e3)
         .with("frame_low", time.low * 1e3)

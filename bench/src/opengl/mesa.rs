@@ -2,7 +2,7 @@
 //! frame (figures 4.7 and 4.9).
 
 use super::programs::find;
-use super::{Backend, Cost, Display, Program, Session, write};
+use super::{Backend, Cost, Display, Drawing, Program, Session, write};
 use crate::clock::Sample;
 use crate::record::Row;
 use crate::stats::Summary;
@@ -50,15 +50,9 @@ impl Mesa {
             let data = self.dir.path().join("mesh").with_extension(program.format().extension());
             write(mesh, program.format(), &data)?;
             let dir = self.dir.path().join(program.name().replace(' ', "-"));
-            let started = Session::start(
-                program,
-                Backend::Llvmpipe,
-                None,
-                &self.display,
-                &dir,
-                &data,
-                size_px,
-            );
+            let drawing = Drawing { data: &data, size_px, view: None };
+            let started =
+                Session::start(program, Backend::Llvmpipe, None, &self.display, &dir, drawing);
             std::fs::remove_file(&data)?;
             match started {
                 Ok(mut session) => {

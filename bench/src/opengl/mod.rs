@@ -10,5 +10,5 @@ mod session;
 pub use data::{Format, write};
 pub use display::Display;
 pub use mesa::{Mesa, MesaFrames};
-pub use programs::{Program, find};
+pub use programs::{Drawing, Program, find};
 pub use session::{Backend, Cost, Session, Tools};

@@ -2,7 +2,20 @@
 //! installed programs are used unchanged, through their own script languages.
 
 use super::Format;
+use datasets::view::View;
 use std::path::{Path, PathBuf};
+
+/// What a program draws.
+#[derive(Debug, Clone, Copy)]
+pub struct Drawing<'a> {
+    /// A file in the format of the program.
+    pub data: &'a Path,
+    /// Width and height of the window.
+    pub size_px: u32,
+    /// Where it looks from, frame after frame nearly the same; `None` for once around the data.
+    /// Only ParaView and VTK take a view.
+    pub view: Option<&'a View>,
+}
 
 /// An OpenGL program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -65,22 +78,30 @@ impl Program {
         }
     }
 
-    /// The arguments of `executable` that draw `data` in a window of `size_px` a side; scripts are
-    /// written to `dir`.
+    /// Whether the program can be told where to look from.
+    pub fn takes_a_view(self) -> bool {
+        matches!(self, Program::ParaView | Program::Vtk)
+    }
+
+    /// The arguments of `executable` that draw it; scripts are written to `dir`.
     pub(super) fn arguments(
         self,
         dir: &Path,
-        data: &Path,
-        size_px: u32,
+        drawing: Drawing<'_>,
     ) -> std::io::Result<Vec<String>> {
-        let data = data.to_string_lossy().into_owned();
+        let data = drawing.data.to_string_lossy().into_owned();
         let script = |name: &str, text: &str| -> std::io::Result<String> {
             let file = dir.join(name);
             std::fs::write(&file, text)?;
             Ok(file.to_string_lossy().into_owned())
         };
-        let size = size_px.to_string();
-        Ok(match self {
+        let size = drawing.size_px.to_string();
+        let camera = drawing.view.into_iter().flat_map(|view| {
+            let ends = [view.eye, view.target, view.up].map(|v| v.to_array());
+            let numbers = ends.as_flattened().iter().copied().chain([view.vertical_fov_degrees]);
+            numbers.map(|number| number.to_string()).collect::<Vec<_>>()
+        });
+        let mut arguments = match self {
             Program::Gmsh => {
                 vec![script("gmsh_frames.py", include_str!("scripts/gmsh_frames.py"))?, data, size]
             }
@@ -95,11 +116,16 @@ impl Program {
                 vec![script("vtk_frames.py", include_str!("scripts/vtk_frames.py"))?, data, size]
             }
             Program::Geomview => ["-nopanels", "-c", "-"].map(String::from).to_vec(),
-        })
+        };
+        if self.takes_a_view() {
+            arguments.extend(camera);
+        }
+        Ok(arguments)
     }
 
     /// Commands that the program receives at the start.
-    pub(super) fn startup_commands(self, data: &Path, size_px: u32) -> String {
+    pub(super) fn startup_commands(self, drawing: Drawing<'_>) -> String {
+        let Drawing { data, size_px, .. } = drawing;
         match self {
             Program::Geomview => format!(
                 "(load {})\n(window c0 {{size {size_px} {size_px}}})\n(bbox-draw g1 \

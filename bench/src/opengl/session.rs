@@ -5,7 +5,7 @@
 //! accounting of its process.
 
 use super::programs::find;
-use super::{Display, Program};
+use super::{Display, Drawing, Program};
 use anyhow::Context as _;
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::path::{Path, PathBuf};
@@ -103,7 +103,7 @@ pub struct Session {
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(600);
 
 impl Session {
-    /// Starts `program` with `data`. Scripts, logs and the report are written to `dir`, which the
+    /// Starts `program`. Scripts, logs and the report are written to `dir`, which the
     /// session owns. Backends other than the driver need `gluray`.
     pub fn start(
         program: Program,
@@ -111,12 +111,16 @@ impl Session {
         gluray: Option<&Path>,
         display: &Display,
         dir: &Path,
-        data: &Path,
-        size_px: u32,
+        drawing: Drawing<'_>,
     ) -> anyhow::Result<Session> {
+        anyhow::ensure!(
+            drawing.view.is_none() || program.takes_a_view(),
+            "{} cannot be told where to look from",
+            program.name()
+        );
         std::fs::create_dir_all(dir)?;
         let executable = program.find().map_err(anyhow::Error::msg)?;
-        let arguments = program.arguments(dir, data, size_px)?;
+        let arguments = program.arguments(dir, drawing)?;
         let report = (backend != Backend::Llvmpipe).then(|| dir.join("report.json"));
         let mut command = match &report {
             None => Command::new(&executable),
@@ -165,7 +169,7 @@ impl Session {
                 }
             }
         });
-        input.write_all(program.startup_commands(data, size_px).as_bytes())?;
+        input.write_all(program.startup_commands(drawing).as_bytes())?;
         input.flush()?;
         let mut session = Session { program, pid: child.id(), child, input, lines, report, log };
         session.wait_for("ready")?;
@@ -207,9 +211,10 @@ impl Session {
         Ok(Cost { wall_secs: start.elapsed().as_secs_f64(), cpu_secs: cpu_secs(self.pid)? - cpu })
     }
 
-    /// Makes VTK write the contents of its window, as raw RGB after a short header.
+    /// Makes VTK or ParaView write the contents of its window, as raw RGB after a short header.
     pub fn save(&mut self, file: &Path) -> anyhow::Result<Vec<u8>> {
-        anyhow::ensure!(self.program == Program::Vtk, "{} cannot save images", self.program.name());
+        let can = matches!(self.program, Program::Vtk | Program::ParaView);
+        anyhow::ensure!(can, "{} cannot save images", self.program.name());
         self.input.write_all(format!("save {}\n", file.display()).as_bytes())?;
         self.input.flush()?;
         self.wait_for("saved")?;

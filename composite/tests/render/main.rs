@@ -7,6 +7,7 @@ mod mutated_messages;
 #[path = "../meddling/mutation.rs"]
 mod mutation;
 mod scenes;
+mod stored_blocks;
 mod unreadable_shapes;
 mod volumes;
 #[path = "../meddling/words.rs"]

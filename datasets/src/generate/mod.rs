@@ -31,5 +31,6 @@ pub mod star_field_lines;
 pub mod streamline;
 pub mod swept_slice;
 pub mod thermal_plume;
+mod tube_mesh;
 mod turbulence;
 pub mod wavelet;

@@ -8,7 +8,7 @@ use super::streams::{merge_hits, trace_tree};
 use super::world::World;
 use crate::bvh::traverse::block_hits::{limits_of, set_bits};
 use crate::bvh::traverse::incoherent;
-use crate::bvh::traverse::packet::{GROUPS, Packet, PacketEntries, RaysLeft};
+use crate::bvh::traverse::packet::{GROUPS, Packet, PacketEntries};
 use crate::ray::{HitBlock, LANES, RayBlock};
 use fearless_simd::Simd;
 use std::marker::PhantomData;
@@ -52,18 +52,18 @@ impl<S: Simd, T: TriangleTest, Q: HitQuery> PacketEntries<S> for EntryPackets<'_
     #[inline(always)]
     fn leaf(
         &mut self,
+        packet: &mut Packet,
         simd: S,
         units: &[Unit],
         leaf: ChildRef,
         reached: u16,
         lanes: &[u16; LANES],
-        mut left: RaysLeft<'_>,
     ) -> u16 {
         let world = self.world;
         let Some(entry) = world.entry_of_leaf(units, leaf, self.filter) else { return 0 };
         let changed = self.enter(simd, entry, reached, lanes);
         for g in set_bits(changed) {
-            left.lower::<Q>(g, &self.hits[g]);
+            packet.left().lower::<Q>(g, &self.hits[g]);
         }
         changed
     }

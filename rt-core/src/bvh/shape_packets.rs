@@ -10,7 +10,7 @@ use crate::bvh::layout::wide::{ChildRef, Unit, WideBvh};
 use crate::bvh::query::HitQuery;
 use crate::bvh::traverse::block_entries::{BlockEntries, traverse_block};
 use crate::bvh::traverse::block_hits::{limits_of, set_bits};
-use crate::bvh::traverse::packet::{GROUPS, Packet, PacketEntries, PacketLimits, RaysLeft};
+use crate::bvh::traverse::packet::{GROUPS, Packet, PacketEntries, PacketLimits, PacketPart};
 use crate::bvh::traverse::single::{RaySetup, traverse_from};
 use crate::bvh::traverse::tree_view::TreeView;
 use crate::bvh::traverse::triangle_leaf::ClosestTri;
@@ -34,6 +34,20 @@ pub(super) trait PacketShape: Shape {
         hits: &mut [HitBlock],
         room: PacketRoom<'_>,
     );
+
+    /// Some rays of a packet through primitive `prim`, with what the packet knows of them: calls
+    /// `found` for each group with hits ([`Packet::trace_part`]). Returns false, and traces nothing,
+    /// where they had better enter it by [`PacketShape::trace`].
+    fn trace_part<S: Simd, Q: HitQuery>(
+        &self,
+        _simd: S,
+        _prim: u32,
+        _packet: &mut Packet,
+        _part: PacketPart<'_>,
+        _found: impl FnMut(&Packet, usize),
+    ) -> bool {
+        false
+    }
 
     /// Gets the closest hits of the rays, with the places of triangles where they are known, for
     /// shading, which will ask for the surface at each.
@@ -196,16 +210,61 @@ impl<Q: HitQuery, P: PacketShape> Rays<'_, Q, P> {
         self.shape.trace::<S, Q>(simd, number, local, found, room);
         let mut changed = 0;
         for ((found, places), &g) in found.iter().zip(&*places).zip(&entered) {
-            let nearer = merge::<Q>(&mut self.hits[g], found, number, self.instance);
-            for lane in 0..LANES {
-                let is_nearer = nearer >> lane & 1 == 1;
-                let place = &mut self.places[g][lane];
-                *place = if is_nearer { places[lane] } else { *place };
-            }
-            changed |= u16::from(nearer != 0) << g;
+            let (hits, kept) = (&mut self.hits[g], &mut self.places[g]);
+            let nearer = keep_nearer::<Q>(hits, kept, found, places, number, self.instance);
+            changed |= u16::from(nearer) << g;
         }
         changed
     }
+
+    /// As [`Rays::enter`], by rays that stay in the packet.
+    #[inline(always)]
+    fn enter_in_packet<S: Simd>(
+        &mut self,
+        packet: &mut Packet,
+        simd: S,
+        number: u32,
+        reached: u16,
+        lanes: &[u16; LANES],
+    ) -> u16 {
+        let Rays { shape, rays, instance, .. } = *self;
+        // The hits are changed after the part has begun with them.
+        let before = &*self.hits;
+        let (mut changed, mut results) = (0, [const { None }; GROUPS]);
+        let part = PacketPart { rays, hits: before, reached, lanes };
+        let traced = shape.trace_part::<S, Q>(simd, number, packet, part, |packet, g| {
+            results[g & 15] = Some((packet.hits_of(g), packet.place[g & 15]));
+        });
+        if !traced {
+            return self.enter(simd, number, reached, |g| lanes[g & 15]);
+        }
+        for (g, result) in results.iter().enumerate() {
+            let Some((found, places)) = result else { continue };
+            let (hits, kept) = (&mut self.hits[g], &mut self.places[g]);
+            let nearer = keep_nearer::<Q>(hits, kept, found, places, number, instance);
+            changed |= u16::from(nearer) << g;
+        }
+        changed
+    }
+}
+
+/// Keeps what was found in primitive `prim` where it is nearer ([`merge`]), with its place. Returns
+/// whether anything was.
+#[inline(always)]
+fn keep_nearer<Q: HitQuery>(
+    hits: &mut HitBlock,
+    places: &mut [TrianglePlace; LANES],
+    found: &HitBlock,
+    places_found: &[TrianglePlace; LANES],
+    prim: u32,
+    instance: u32,
+) -> bool {
+    let nearer = merge::<Q>(hits, found, prim, instance);
+    for lane in 0..LANES {
+        let is_nearer = nearer >> lane & 1 == 1;
+        places[lane] = if is_nearer { places_found[lane] } else { places[lane] };
+    }
+    nearer != 0
 }
 
 /// Keeps what was found in primitive `prim` where it is nearer; of two hits at the same distance,
@@ -233,21 +292,27 @@ impl<S: Simd, Q: HitQuery, P: PacketShape> PacketEntries<S> for Rays<'_, Q, P> {
     #[inline(never)]
     fn leaf(
         &mut self,
+        packet: &mut Packet,
         simd: S,
         units: &[Unit],
         leaf: ChildRef,
         reached: u16,
         lanes: &[u16; LANES],
-        mut left: RaysLeft<'_>,
     ) -> u16 {
-        let mut changed = 0;
-        for &prim in leaf_primitive_ids(units, leaf) {
-            changed |= self.enter(simd, prim, reached, |g| lanes[g & 15]);
-        }
-        for g in set_bits(changed) {
-            left.lower::<Q>(g, &self.hits[g]);
-        }
-        changed
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let mut all = 0;
+                for &prim in leaf_primitive_ids(units, leaf) {
+                    let changed = self.enter_in_packet(packet, simd, prim, reached, lanes);
+                    for g in set_bits(changed) {
+                        packet.left().lower::<Q>(g, &self.hits[g]);
+                    }
+                    all |= changed;
+                }
+                all
+            },
+        )
     }
 }
 

@@ -1,8 +1,12 @@
-"""Frames of ParaView, one for each line that comes; for pvbatch."""
-import os, sys
+"""Frames of ParaView, one for each line that comes; for pvbatch. Arguments: the file, pixels a
+side, and for a view of its own the camera: position, focal point, up, angle."""
+import itertools, os, sys
 from paraview.simple import *
+from vtkmodules.vtkIOImage import vtkPNMWriter
+from vtkmodules.vtkRenderingCore import vtkWindowToImageFilter
 
 file, size = sys.argv[1], int(sys.argv[2])
+at = [float(number) for number in sys.argv[3:]]
 reader = XMLPolyDataReader(FileName=[file])
 view = CreateRenderView(ViewSize=[size, size])
 shown = Show(reader, view)
@@ -10,15 +14,33 @@ shown = Show(reader, view)
 shown.ColorArrayName = ["POINTS", ""]
 view.ResetCamera()
 camera = view.GetActiveCamera()
-camera.Azimuth(30)
-camera.Elevation(20)
+if at:
+    view.CameraPosition, view.CameraFocalPoint = at[0:3], at[3:6]
+    view.CameraViewUp, view.CameraViewAngle = at[6:9], at[9]
+else:
+    camera.Azimuth(30)
+    camera.Elevation(20)
+# A view of its own is kept, to and fro; without one, the camera goes around the data.
+turns = itertools.cycle([1, -1]) if at else itertools.repeat(5)
 Render(view)
 # ParaView's own `print` goes through a buffer that `flush` does not empty, unless PYTHONUNBUFFERED
 # is set.
 os.write(1, b"ready\n")
 # ParaView's own `sys.stdin` strips line ends, so an empty line looks like the end of the input.
 commands = os.fdopen(os.dup(0))
-while commands.readline():
-    camera.Azimuth(5)
+while command := commands.readline():
+    if command.startswith("save "):
+        # Write the contents of the window as raw RGB.
+        picture = vtkWindowToImageFilter()
+        picture.SetInput(view.GetRenderWindow())
+        picture.ReadFrontBufferOff()
+        picture.ShouldRerenderOff()
+        writer = vtkPNMWriter()
+        writer.SetFileName(command[5:].rstrip("\n"))
+        writer.SetInputConnection(picture.GetOutputPort())
+        writer.Write()
+        os.write(1, b"saved\n")
+        continue
+    camera.Azimuth(next(turns))
     Render(view)
     os.write(1, b"frame\n")

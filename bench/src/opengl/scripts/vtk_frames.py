@@ -1,8 +1,10 @@
-"""Frames of a VTK program in Python, one for each line that comes."""
-import sys
+"""Frames of a VTK program in Python, one for each line that comes. Arguments: the file, pixels a
+side, and for a view of its own the camera: position, focal point, up, angle."""
+import itertools, sys
 import vtk
 
 file, size = sys.argv[1], int(sys.argv[2])
+view = [float(number) for number in sys.argv[3:]]
 reader = vtk.vtkXMLPolyDataReader()
 reader.SetFileName(file)
 mapper = vtk.vtkPolyDataMapper()
@@ -21,9 +23,18 @@ window.SetMultiSamples(0)
 window.AddRenderer(renderer)
 window.Render()
 camera = renderer.GetActiveCamera()
-camera.Azimuth(30)
-camera.Elevation(20)
-renderer.ResetCamera()
+if view:
+    camera.SetPosition(view[0:3])
+    camera.SetFocalPoint(view[3:6])
+    camera.SetViewUp(view[6:9])
+    camera.SetViewAngle(view[9])
+    renderer.ResetCameraClippingRange()
+else:
+    camera.Azimuth(30)
+    camera.Elevation(20)
+    renderer.ResetCamera()
+# A view of its own is kept, to and fro; without one, the camera goes around the data.
+turns = itertools.cycle([1, -1]) if view else itertools.repeat(5)
 window.Render()
 print("ready", flush=True)
 while line := sys.stdin.readline():
@@ -39,7 +50,8 @@ while line := sys.stdin.readline():
         writer.Write()
         print("saved", flush=True)
         continue
-    camera.Azimuth(5)
+    camera.Azimuth(next(turns))
+    renderer.ResetCameraClippingRange()
     window.Render()
     # Wait until the image is finished, as programs that save images do.
     window.WaitForCompletion()

@@ -39,8 +39,12 @@ impl MeshletCache {
     ) -> (&mut Expanded, &'u [u32]) {
         let unit = leaf.unit();
         let words: &[u32] = bytemuck::cast_slice(&units[unit..]);
-        // Neighbours in the array are neighbours in space: a multiplication spreads all.
-        let place = (unit as u32).wrapping_mul(0x9e37_79b9) >> (32 - SLOTS_LOG2);
+        // Neighbours in the array are neighbours in space: a multiplication spreads all. Pages of a
+        // stored mesh have the same units, so the key decides too (the numbers are odd, from
+        // Fibonacci hashing and from MurmurHash3).
+        let mixed =
+            (unit as u32).wrapping_mul(0x9e37_79b9) ^ (key as u32).wrapping_mul(0x85eb_ca6b);
+        let place = mixed >> (32 - SLOTS_LOG2);
         let (held, expanded) = (&mut self.held[place as usize], &mut self.expanded[place as usize]);
         if *held != (key, unit as u32) {
             // Should a panic leave it half done, the place must not count as filled.

@@ -6,7 +6,7 @@ use crate::bvh::compact::TrianglePlace;
 use crate::bvh::query::{HitQuery, WatertightTest};
 use crate::bvh::shape_packets::{PacketRoom, PacketShape};
 use crate::bvh::traverse::meshlets;
-use crate::bvh::traverse::packet::PacketLimits;
+use crate::bvh::traverse::packet::{Packet, PacketLimits, PacketPart};
 use crate::ray::{HitBlock, LANES, RayBlock};
 use fearless_simd::Simd;
 
@@ -23,6 +23,23 @@ impl PacketShape for StoredMesh {
         room: PacketRoom<'_>,
     ) {
         self.with_page(page, |page| page.trace::<S, Q>(simd, rays, hits, room));
+    }
+
+    fn trace_part<S: Simd, Q: HitQuery>(
+        &self,
+        simd: S,
+        page: u32,
+        packet: &mut Packet,
+        part: PacketPart<'_>,
+        found: impl FnMut(&Packet, usize),
+    ) -> bool {
+        if (part.reached.count_ones() as usize) < FEWEST_GROUPS {
+            return false;
+        }
+        self.with_page(page, |page| {
+            packet.trace_part::<S, WatertightTest, Q>(simd, &page.view(), part, found);
+        });
+        true
     }
 
     fn keep_places(&self, rays: &[RayBlock], hits: &[HitBlock], places: &[[TrianglePlace; LANES]]) {

@@ -37,20 +37,26 @@ pub(crate) trait PacketEntries<S: Simd> {
     /// What is asked about the rays.
     type Query: HitQuery;
 
-    /// Traces the rays `lanes[g]` of each group g in `reached` through the entries of a leaf.
-    /// Returns the groups of which some ray has less left to search.
+    /// Traces the rays `lanes[g]` of each group g in `reached` of the packet through the entries of
+    /// a leaf. Returns the groups of which some ray has less left to search ([`Packet::left`]).
     fn leaf(
         &mut self,
+        packet: &mut Packet,
         simd: S,
         units: &[Unit],
         leaf: ChildRef,
         reached: u16,
         lanes: &[u16; LANES],
-        left: RaysLeft<'_>,
     ) -> u16;
 }
 
 impl Packet {
+    /// What its rays still search for.
+    #[inline(always)]
+    pub(crate) fn left(&mut self) -> RaysLeft<'_> {
+        RaysLeft { t: &mut self.t, active: &mut self.active }
+    }
+
     /// Sends the loaded rays to the leaves of the upper level whose boxes they enter. Every ray is
     /// tested against the boxes: moving one into an instance's space costs more than the test.
     pub(crate) fn visit_entries<S: Simd, E: PacketEntries<S>>(
@@ -79,8 +85,7 @@ impl<S: Simd, E: PacketEntries<S>> PacketLeaf<S> for Entries<'_, E> {
         reached: u16,
         lanes: &[u16; LANES],
     ) -> u16 {
-        let left = RaysLeft { t: &mut packet.t, active: &mut packet.active };
-        self.0.leaf(simd, units, leaf, reached, lanes, left)
+        self.0.leaf(packet, simd, units, leaf, reached, lanes)
     }
 
     fn switch_to_single(

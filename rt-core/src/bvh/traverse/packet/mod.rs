@@ -15,6 +15,7 @@
 mod entries;
 mod load;
 mod meshlets;
+mod part;
 mod strategy;
 mod switch_to_single;
 mod triangles;
@@ -27,9 +28,10 @@ use crate::bvh::query::{HitQuery, TriangleTest};
 use crate::bvh::traverse::single::RaySetup;
 use crate::bvh::traverse::tree_view::TreeView;
 use crate::ray::{HitBlock, LANES, NO_HIT};
-pub(crate) use entries::{PacketEntries, RaysLeft};
+pub(crate) use entries::PacketEntries;
 use fearless_simd::{Select, Simd, SimdBase, SimdMask, f32x16, mask32x16, u32x16};
 pub(crate) use load::PacketLimits;
+pub(crate) use part::PacketPart;
 use strategy::{Strategy, StrategyChoice};
 use triangles::Triangles;
 

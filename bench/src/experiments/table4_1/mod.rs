@@ -1,22 +1,22 @@
 //! Table 4.1: frames of unmodified OpenGL programs, by a software rasteriser and by ray tracing.
 
+mod subjects;
+
 use super::Context;
-use super::wavelet_series::has_room;
-use crate::opengl::{Backend, Cost, Display, Program, Session, Tools, write};
+use crate::opengl::{Backend, Cost, Display, Drawing, Program, Session, Tools, write};
 use crate::plot::{Axis, Plot, Series};
 use crate::record::{Record, Row};
 use crate::runner::{Ratio, order};
 use crate::stats::Summary;
 use datasets::cli::UsageError;
-use datasets::generate::nested_wavelet::Size;
-use rt_core::mesh::TriMesh;
+use datasets::view::View;
 use std::path::Path;
-use std::sync::Arc;
+use subjects::Subject;
 
 /// Width and height of the programs' windows.
 const SIZE_PX: u32 = 1024;
-/// What a program takes with the mesh in it, at most: gmsh, and what gluray keeps.
-const BYTES_PER_TRIANGLE: f64 = 700.0;
+/// The column `view` of frames from all around.
+const AROUND: &str = "around";
 const BACKENDS: [Backend; 3] = [Backend::Llvmpipe, Backend::Serial, Backend::Asynchronous];
 
 /// The backends that differ for a program. ParaView and VTK draw into framebuffer objects, which
@@ -35,7 +35,14 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         "",
         "an unmodified program; it turns the model by a few degrees from frame to frame",
     );
-    record.column("triangles", "", "triangles of the wavelet surfaces in its file");
+    record.column("data", "", "data set whose triangles are in its file, as `datasets` names it");
+    record.column("triangles", "", "triangles in its file");
+    record.column(
+        "view",
+        "",
+        "from where: `around` it, all of it in sight; or a view of the data set, to and fro by a \
+         degree, by programs that can be told",
+    );
     record.column("backend", "", "renderer: Mesa's llvmpipe, or gluray in mode match");
     record.column("fps", "1/s", "frames a second by the median frame");
     record.column("time", "ms", "median wall time of a frame");
@@ -88,25 +95,18 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.missing.extend(missing);
     let display = Display::start(&tools.xvfb)?;
     let dir = tempfile::tempdir()?;
-    let sizes = if context.quick {
-        &[None][..]
-    } else {
-        &[Some(Size::M1), Some(Size::M4), Some(Size::M16)]
-    };
-    for &size in sizes {
-        let mesh = match size {
-            None => crate::meshes::coarse_wavelet(51)?,
-            Some(size) => match has_room(BYTES_PER_TRIANGLE * size.triangles() as f64) {
-                Ok(()) => context.wavelet(size)?,
-                Err(why) => {
-                    record.missing.push(format!("{} triangles: a program {why}", size.name()));
-                    continue;
-                }
-            },
-        };
+    if context.thesis {
+        record.notes.push("The largest data sets that a program has room for (--thesis).".into());
+    }
+    let setup = ProgramSetup { tools: &tools, display: &display, dir: dir.path() };
+    for i in 0..subjects::count(context) {
+        let Some(subject) = subjects::subject(context, record, i)? else { continue };
         for &program in &programs {
-            let setup = ProgramSetup { tools: &tools, display: &display, dir: dir.path() };
-            measure(context, record, &setup, program, &mesh)?;
+            for view in &subject.views {
+                if view.is_none() || program.takes_a_view() {
+                    measure(context, record, &setup, program, &subject, view.as_ref())?;
+                }
+            }
         }
     }
     record.plots.push(plot(record));
@@ -132,12 +132,17 @@ fn measure(
     record: &mut Record,
     setup: &ProgramSetup<'_>,
     program: Program,
-    mesh: &Arc<TriMesh>,
+    subject: &Subject,
+    view: Option<&View>,
 ) -> anyhow::Result<()> {
+    let mesh = &subject.mesh;
     let n = mesh.num_triangles();
+    let of = Rows { program, data: subject.data, triangles: n, view };
+    let name = of.name();
     let data = setup.dir.join(format!("{n}")).with_extension(program.format().extension());
-    context.report_step(format!("{}, {n} triangles: data", program.name()))?;
+    context.report_step(format!("{name}: data"))?;
     write(mesh, program.format(), &data)?;
+    let drawing = Drawing { data: &data, size_px: SIZE_PX, view };
     // CPU time has a resolution of 1/100 s; groups of frames take much longer than that.
     let (groups, frames) = match (context.quick, n) {
         (true, _) => (3, 5),
@@ -160,8 +165,7 @@ fn measure(
             Some(&setup.tools.gluray),
             setup.display,
             &dir,
-            &data,
-            SIZE_PX,
+            drawing,
         )?;
         measurement.first_secs = begun.elapsed().as_secs_f64();
         s.frames(if backend == Backend::Llvmpipe { 1 } else { settle })?;
@@ -175,19 +179,11 @@ fn measure(
     if together {
         let mut sessions = Vec::new();
         for (backend, m) in backends.iter().copied().zip(&mut all) {
-            context.report_step(format!(
-                "{}, {n} triangles: starting {}",
-                program.name(),
-                backend.name()
-            ))?;
+            context.report_step(format!("{name}: starting {}", backend.name()))?;
             sessions.push(start(backend, m)?);
         }
         for round in 0..groups {
-            context.report_step(format!(
-                "{}, {n} triangles: group {} of {groups}",
-                program.name(),
-                round + 1
-            ))?;
+            context.report_step(format!("{name}: group {} of {groups}", round + 1))?;
             for i in order(backends.len(), round) {
                 all[i].groups.push(per_frame(sessions[i].frames(frames)?, frames));
             }
@@ -198,11 +194,7 @@ fn measure(
         }
     } else {
         for (backend, m) in backends.iter().copied().zip(&mut all) {
-            context.report_step(format!(
-                "{}, {n} triangles: {}",
-                program.name(),
-                backend.name()
-            ))?;
+            context.report_step(format!("{name}: {}", backend.name()))?;
             let mut s = start(backend, m)?;
             for _ in 0..groups {
                 m.groups.push(per_frame(s.frames(frames)?, frames));
@@ -213,9 +205,9 @@ fn measure(
     }
     std::fs::remove_file(&data)?;
     for (i, backend) in backends.iter().copied().enumerate() {
-        record.rows.push(row(program, n, backend, &all[0], &all[i]));
+        record.rows.push(of.row(backend, &all[0], &all[i]));
         if i > 0 {
-            record.ratios.extend(ratio(program, n, backend, (&all[0], &all[i]), together));
+            record.ratios.extend(of.ratio(backend, (&all[0], &all[i]), together));
         }
     }
     Ok(())
@@ -258,37 +250,61 @@ fn each(native: &Measurement, ours: &Measurement, of: impl Fn(&Cost) -> f64) -> 
     native.groups.iter().zip(&ours.groups).map(|(n, o)| of(n) / of(o)).collect()
 }
 
-fn row(program: Program, n: usize, backend: Backend, native: &Measurement, m: &Measurement) -> Row {
-    let of = |f: &dyn Fn(&Cost) -> f64| Summary::of(&m.groups.iter().map(f).collect::<Vec<_>>());
-    let row = Row::new()
-        .with("program", program.name())
-        .with("triangles", n)
-        .with("backend", backend.name());
-    let (Some(wall), Some(cpu)) = (of(&|c| c.wall_secs), of(&|c| c.cpu_secs)) else { return row };
-    let median = |of: &dyn Fn(&Cost) -> f64| Summary::of(&each(native, m, of)).map(|s| s.median);
-    row.with("fps", 1.0 / wall.median)
-        .with("time", wall.median * 1e3)
-        .with("time_low", wall.low * 1e3)
-        .with("time_high", wall.high * 1e3)
-        .with("cpu", cpu.median * 1e3)
-        .with("first", m.first_secs)
-        .with("memory", m.peak_bytes.map(|b| b as f64 / f64::from(1 << 30)))
-        .with("speedup", median(&|c| c.wall_secs))
-        .with("cpu_speedup", median(&|c| c.cpu_secs))
-        .with("load", crate::machine::load())
+/// What the rows of one comparison are about.
+struct Rows<'a> {
+    program: Program,
+    data: &'static str,
+    triangles: usize,
+    view: Option<&'a View>,
 }
 
-fn ratio(
-    program: Program,
-    n: usize,
-    backend: Backend,
-    (native, ours): (&Measurement, &Measurement),
-    in_turns: bool,
-) -> Option<Ratio> {
-    let name = format!("{}, {n} triangles, {}", program.name(), backend.name());
-    let ratio =
-        Ratio::of_rounds(name, Backend::Llvmpipe.name(), &each(native, ours, |c| c.wall_secs))?;
-    Some(Ratio { in_turns, ..ratio })
+impl Rows<'_> {
+    fn view(&self) -> &str {
+        self.view.map_or(AROUND, |view| &view.name)
+    }
+
+    fn name(&self) -> String {
+        let Rows { program, data, triangles, .. } = self;
+        format!("{}, {data}, {triangles} triangles, {}", program.name(), self.view())
+    }
+
+    fn row(&self, backend: Backend, native: &Measurement, m: &Measurement) -> Row {
+        let of =
+            |f: &dyn Fn(&Cost) -> f64| Summary::of(&m.groups.iter().map(f).collect::<Vec<_>>());
+        let row = Row::new()
+            .with("program", self.program.name())
+            .with("data", self.data)
+            .with("triangles", self.triangles)
+            .with("view", self.view())
+            .with("backend", backend.name());
+        let (Some(wall), Some(cpu)) = (of(&|c| c.wall_secs), of(&|c| c.cpu_secs)) else {
+            return row;
+        };
+        let median =
+            |of: &dyn Fn(&Cost) -> f64| Summary::of(&each(native, m, of)).map(|s| s.median);
+        row.with("fps", 1.0 / wall.median)
+            .with("time", wall.median * 1e3)
+            .with("time_low", wall.low * 1e3)
+            .with("time_high", wall.high * 1e3)
+            .with("cpu", cpu.median * 1e3)
+            .with("first", m.first_secs)
+            .with("memory", m.peak_bytes.map(|b| b as f64 / f64::from(1 << 30)))
+            .with("speedup", median(&|c| c.wall_secs))
+            .with("cpu_speedup", median(&|c| c.cpu_secs))
+            .with("load", crate::machine::load())
+    }
+
+    fn ratio(
+        &self,
+        backend: Backend,
+        (native, ours): (&Measurement, &Measurement),
+        in_turns: bool,
+    ) -> Option<Ratio> {
+        let name = format!("{}, {}", self.name(), backend.name());
+        let ratio =
+            Ratio::of_rounds(name, Backend::Llvmpipe.name(), &each(native, ours, |c| c.wall_secs))?;
+        Some(Ratio { in_turns, ..ratio })
+    }
 }
 
 fn plot(record: &Record) -> Plot {
@@ -302,6 +318,7 @@ fn plot(record: &Record) -> Plot {
             let of = record.rows.iter().filter(|r| {
                 r.text("program") == Some(program.name())
                     && r.text("backend") == Some(backend.name())
+                    && r.text("view") == Some(AROUND)
             });
             let points: Vec<(f64, f64)> =
                 of.filter_map(|r| r.number("triangles").zip(r.number("fps"))).collect();

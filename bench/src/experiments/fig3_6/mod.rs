@@ -1,6 +1,8 @@
 //! Figure 3.6: weak scaling of data-parallel rendering, with the same number of triangles on every
 //! rank: of camera rays alone as in the dissertation, and with light from other ranks' parts.
 
+mod stored_blocks;
+
 use super::Context;
 use super::many_ranks::{Sharing, cost_columns, frames, powers, with_cost};
 use crate::meshes;
@@ -19,6 +21,15 @@ const LOCAL: &str = "shadows of the own part alone";
 /// Rays of ambient occlusion for each hit.
 const OCCLUSION_RAYS: u32 = 4;
 
+/// Where rays go of what lights the surface so.
+fn secondary_rays_of(light: &str) -> SecondaryRayPolicy {
+    match light {
+        LIT => SecondaryRayPolicy::Forward,
+        LOCAL => SecondaryRayPolicy::LocalOnly,
+        _ => SecondaryRayPolicy::default(),
+    }
+}
+
 pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
     cost_columns(record);
     record.column("triangles", "", "triangles of the whole scene");
@@ -27,41 +38,17 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     let (largest, size, count) =
         if context.quick { (Size::M1, 384, 1) } else { (Size::M8, 1024, 5) };
     record.notes.push(format!(
-        "Wavelet surfaces, {size} x {size} pixels, triangles per rank as constant as \
-         the named sizes allow. Every rank traces camera rays \
+        "{size} x {size} pixels. Every rank traces camera rays \
          where its part is; that the image is that of one node is for composite's tests, and not \
          looked at here. The dissertation plots average and maximum render time: what \
          lies between them is waiting. `{LIT}`: a lamp with shadows and {OCCLUSION_RAYS} rays of \
          ambient occlusion for each hit, whose rays go to the ranks whose parts they enter. \
          `{LOCAL}`: they end where the own part does, so that shadows of other parts are missing."
     ));
-    for ranks in powers(1, 128) {
-        context.report_step(format!("{ranks} ranks"))?;
-        let mesh = mesh(context, largest, ranks)?;
-        let triangles = mesh.num_triangles();
-        for (light, secondary_rays) in [
-            (HEADLIGHT, SecondaryRayPolicy::default()),
-            (LIT, SecondaryRayPolicy::Forward),
-            (LOCAL, SecondaryRayPolicy::LocalOnly),
-        ] {
-            let global_light = light != HEADLIGHT;
-            let demo = Demo { size_px: [size; 2], global_light, ..Demo::default() };
-            let (mut scene, camera) = demo.scene_of(mesh.clone())?;
-            if let Some(occlusion) = &mut scene.ambient_occlusion {
-                occlusion.rays = OCCLUSION_RAYS;
-            }
-            let partition = Partition::new(&scene, ranks, &Split::Triangles);
-            let prepared =
-                PreparedDemo { scene, camera, options: RenderOptions::new(size, size), partition };
-            let options = FrameOptions { secondary_rays, ..FrameOptions::default() };
-            let measured = frames(&prepared, ranks, count, Sharing::SortLast, &options)?;
-            record.rows.push(
-                with_cost(Row::new(), ranks, &measured)
-                    .with("light", light)
-                    .with("triangles", triangles)
-                    .with("per_rank", triangles / ranks),
-            );
-        }
+    if context.thesis {
+        stored_blocks::run(context, record, powers(1, 128), size, 3)?;
+    } else {
+        parts_of_one_mesh(context, record, largest, size, count)?;
     }
     let of = |record: &Record, light: &str, column: &str| -> Vec<(f64, f64)> {
         let rows = record.rows.iter().filter(|r| r.text("light") == Some(light));
@@ -91,6 +78,47 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         record.notes.push(format!(
             "`{LIT}` takes at most {worst:.2} times as long as `{LOCAL}`, over all numbers of ranks."
         ));
+    }
+    Ok(())
+}
+
+/// Parts of as many triangles of one mesh, about `largest` / 128 on each rank.
+fn parts_of_one_mesh(
+    context: &mut Context<'_>,
+    record: &mut Record,
+    largest: Size,
+    size: u32,
+    count: usize,
+) -> anyhow::Result<()> {
+    record
+        .notes
+        .push("Wavelet surfaces, triangles per rank as constant as the named sizes allow.".into());
+    for ranks in powers(1, 128) {
+        context.report_step(format!("{ranks} ranks"))?;
+        let mesh = mesh(context, largest, ranks)?;
+        let triangles = mesh.num_triangles();
+        for light in [HEADLIGHT, LIT, LOCAL] {
+            let global_light = light != HEADLIGHT;
+            let demo = Demo { size_px: [size; 2], global_light, ..Demo::default() };
+            let (mut scene, camera) = demo.scene_of(mesh.clone())?;
+            if let Some(occlusion) = &mut scene.ambient_occlusion {
+                occlusion.rays = OCCLUSION_RAYS;
+            }
+            let partition = Partition::new(&scene, ranks, &Split::Triangles);
+            let prepared =
+                PreparedDemo { scene, camera, options: RenderOptions::new(size, size), partition };
+            let options = FrameOptions {
+                secondary_rays: secondary_rays_of(light),
+                ..FrameOptions::default()
+            };
+            let measured = frames(&prepared, ranks, count, Sharing::SortLast, &options)?;
+            record.rows.push(
+                with_cost(Row::new(), ranks, &measured)
+                    .with("light", light)
+                    .with("triangles", triangles)
+                    .with("per_rank", triangles / ranks),
+            );
+        }
     }
     Ok(())
 }
