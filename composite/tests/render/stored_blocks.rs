@@ -23,7 +23,7 @@ fn place(block: usize) -> DAffine3 {
 
 #[test]
 fn blocks_in_stored_meshes_have_the_bits_of_one_node() {
-    let mut mesh = scenes::bumps(DVec3::ZERO, 40);
+    let mut mesh = scenes::bumps(DVec3::ZERO, 80);
     mesh.positions.iter_mut().for_each(|p| *p *= 0.4);
     let mut writer = StoredMeshWriter::new(Vec::new(), mesh.origin).expect("memory");
     writer.add_mesh(&mesh).expect("a sound mesh");

@@ -15,8 +15,9 @@ impl Polylines {
     /// and the scalars of the lines. A segment is `2 * sides` triangles. Lines of one point, or of
     /// points that are all the same, are left out.
     ///
-    /// The sections do not turn around the line from point to point: Wang, Jüttler, Zheng and Liu,
-    /// "Computation of rotation minimizing frames", ACM Transactions on Graphics 27 (2008), table I.
+    /// The sections do not turn around the line from point to point: Wang, Jüttler, Zheng and
+    /// Liu, "Computation of rotation minimizing frames", ACM Transactions on Graphics 27 (2008),
+    /// table I.
     ///
     /// # Errors
     /// [`MeshError::TooLarge`] for more vertices than a mesh can have.

@@ -36,8 +36,8 @@ pub(super) trait PacketShape: Shape {
     );
 
     /// Some rays of a packet through primitive `prim`, with what the packet knows of them: calls
-    /// `found` for each group with hits ([`Packet::trace_part`]). Returns false, and traces nothing,
-    /// where they had better enter it by [`PacketShape::trace`].
+    /// `found` for each group with hits ([`Packet::trace_part`]). Returns false, and traces
+    /// nothing, where they had better enter it by [`PacketShape::trace`].
     fn trace_part<S: Simd, Q: HitQuery>(
         &self,
         _simd: S,
