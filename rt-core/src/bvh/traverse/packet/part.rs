@@ -1,5 +1,5 @@
-//! Some of a packet's rays through another tree in the same space, a page of a stored mesh: what the
-//! packet knows of its rays serves there too, and nothing is loaded again.
+//! Some of a packet's rays through another tree in the same space, a page of a stored mesh: what
+//! the packet knows of its rays serves there too, and nothing is loaded again.
 
 use super::{GROUPS, Packet, Row, load_row};
 use crate::bvh::query::{HitQuery, TriangleTest};
