@@ -25,14 +25,15 @@ use std::marker::PhantomData;
 pub(super) trait PacketShape: Shape {
     /// At most sixteen blocks through primitive `prim`; lanes whose ranges are empty hit nothing.
     /// The hits are those of [`Shape::closest`]. `hits` has none yet, and gets any number of a
-    /// primitive where there is one.
+    /// primitive where there is one. `places`, which has none yet, gets where hit triangles lie in
+    /// the primitive.
     fn trace<S: Simd, Q: HitQuery>(
         &self,
         simd: S,
         prim: u32,
         rays: &[RayBlock],
         hits: &mut [HitBlock],
-        room: PacketRoom<'_>,
+        places: &mut [[TrianglePlace; LANES]],
     );
 
     /// Some rays of a packet through primitive `prim`, with what the packet knows of them: calls
@@ -60,14 +61,6 @@ pub(super) trait PacketShape: Shape {
     }
 }
 
-/// What a primitive's rays may use.
-pub(super) struct PacketRoom<'a> {
-    /// For anything.
-    pub(super) packet: &'a mut Packet,
-    /// Gets where hit triangles lie in the primitive. It has none yet.
-    pub(super) places: &'a mut [[TrianglePlace; LANES]],
-}
-
 impl PacketShape for StoredIsosurface {
     fn trace<S: Simd, Q: HitQuery>(
         &self,
@@ -75,7 +68,7 @@ impl PacketShape for StoredIsosurface {
         prim: u32,
         rays: &[RayBlock],
         hits: &mut [HitBlock],
-        _: PacketRoom<'_>,
+        _: &mut [[TrianglePlace; LANES]],
     ) {
         self.closest_of_blocks(simd, prim, rays, hits);
     }
@@ -83,15 +76,14 @@ impl PacketShape for StoredIsosurface {
 
 /// Per-thread buffers.
 struct Room {
-    /// Rays on their way to primitives, and in one.
-    outer: Box<Packet>,
+    /// Rays on their way to primitives.
+    packet: Box<Packet>,
     places: [[TrianglePlace; LANES]; GROUPS],
     inner: PrimitiveRays,
 }
 
 /// The rays that enter a primitive, and what they hit there.
 struct PrimitiveRays {
-    packet: Box<Packet>,
     rays: [RayBlock; GROUPS],
     hits: [HitBlock; GROUPS],
     places: [[TrianglePlace; LANES]; GROUPS],
@@ -105,8 +97,8 @@ impl Room {
     fn new() -> Box<Room> {
         let (rays, hits) = ([RayBlock::INACTIVE; GROUPS], [HitBlock::MISS; GROUPS]);
         let places = [[TrianglePlace::NONE; LANES]; GROUPS];
-        let inner = PrimitiveRays { packet: Packet::new(), rays, hits, places };
-        Box::new(Room { outer: Packet::new(), places, inner })
+        let inner = PrimitiveRays { rays, hits, places };
+        Box::new(Room { packet: Packet::new(), places, inner })
     }
 }
 
@@ -123,15 +115,15 @@ pub(super) fn trace<S: Simd, Q: HitQuery, P: PacketShape>(
     // Should a page be read by a caller's function that traces rays itself, it makes room of its
     // own.
     let mut room = ROOM.take().unwrap_or_else(Room::new);
-    let Room { outer, places, inner } = &mut *room;
+    let Room { packet, places, inner } = &mut *room;
     for (rays, hits) in rays.chunks(GROUPS).zip(hits.chunks_mut(GROUPS)) {
         let places = &mut places[..rays.len()];
         places.fill([TrianglePlace::NONE; LANES]);
         let query = PhantomData::<Q>;
-        if outer.load(simd, rays, &PacketLimits::NONE) {
+        if packet.load(simd, rays, &PacketLimits::NONE) {
             let (hits, places) = (&mut *hits, &mut *places);
-            let mut packet = Rays { shape, rays, hits, places, instance, inner, query };
-            outer.visit_entries(simd, &TreeView::all(tree), &mut packet);
+            let mut entries = Rays { shape, rays, hits, places, instance, inner, query };
+            packet.visit_entries(simd, &TreeView::all(tree), &mut entries);
         } else {
             let blocks = rays.chunks(1).zip(hits.chunks_mut(1)).zip(places.chunks_mut(1));
             for ((rays, hits), places) in blocks {
@@ -183,7 +175,7 @@ impl<Q: HitQuery, P: PacketShape> Rays<'_, Q, P> {
         reached: u16,
         lanes: impl Fn(usize) -> u16,
     ) -> u16 {
-        let PrimitiveRays { packet, rays: local, hits: found, places } = &mut *self.inner;
+        let PrimitiveRays { rays: local, hits: found, places } = &mut *self.inner;
         let (mut n, mut entered) = (0, [0; GROUPS]);
         for g in set_bits(reached) {
             let limits = limits_of::<Q>(&self.rays[g], &self.hits[g]);
@@ -206,8 +198,7 @@ impl<Q: HitQuery, P: PacketShape> Rays<'_, Q, P> {
         let (local, found, places) = (&local[..n], &mut found[..n], &mut places[..n]);
         found.fill(HitBlock::MISS);
         places.fill([TrianglePlace::NONE; LANES]);
-        let room = PacketRoom { packet, places: &mut *places };
-        self.shape.trace::<S, Q>(simd, number, local, found, room);
+        self.shape.trace::<S, Q>(simd, number, local, found, places);
         let mut changed = 0;
         for ((found, places), &g) in found.iter().zip(&*places).zip(&entered) {
             let (hits, kept) = (&mut self.hits[g], &mut self.places[g]);

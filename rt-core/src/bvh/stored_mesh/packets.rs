@@ -1,16 +1,15 @@
 //! Many rays through a page at once.
 
-use super::page::Page;
 use super::{StoredMesh, recent_hits};
 use crate::bvh::compact::TrianglePlace;
 use crate::bvh::query::{HitQuery, WatertightTest};
-use crate::bvh::shape_packets::{PacketRoom, PacketShape};
+use crate::bvh::shape_packets::PacketShape;
 use crate::bvh::traverse::meshlets;
-use crate::bvh::traverse::packet::{Packet, PacketLimits, PacketPart};
+use crate::bvh::traverse::packet::{Packet, PacketPart};
 use crate::ray::{HitBlock, LANES, RayBlock};
 use fearless_simd::Simd;
 
-/// With fewer groups of sixteen rays, each goes through a page by itself.
+/// With fewer groups of sixteen rays, each block goes through a page by itself.
 const FEWEST_GROUPS: usize = 3;
 
 impl PacketShape for StoredMesh {
@@ -20,9 +19,18 @@ impl PacketShape for StoredMesh {
         page: u32,
         rays: &[RayBlock],
         hits: &mut [HitBlock],
-        room: PacketRoom<'_>,
+        places: &mut [[TrianglePlace; LANES]],
     ) {
-        self.with_page(page, |page| page.trace::<S, Q>(simd, rays, hits, room));
+        self.with_page(page, |page| {
+            meshlets::trace_blocks::<S, WatertightTest, Q>(
+                simd,
+                &page.view(),
+                rays,
+                hits,
+                0,
+                places,
+            );
+        });
     }
 
     fn trace_part<S: Simd, Q: HitQuery>(
@@ -44,25 +52,5 @@ impl PacketShape for StoredMesh {
 
     fn keep_places(&self, rays: &[RayBlock], hits: &[HitBlock], places: &[[TrianglePlace; LANES]]) {
         recent_hits::keep(self.key(), rays, hits, places);
-    }
-}
-
-impl Page {
-    /// At most sixteen blocks through the page; the primitives of hits are its triangles.
-    fn trace<S: Simd, Q: HitQuery>(
-        &self,
-        simd: S,
-        rays: &[RayBlock],
-        hits: &mut [HitBlock],
-        PacketRoom { packet, places }: PacketRoom<'_>,
-    ) {
-        let tree = self.view();
-        if rays.len() >= FEWEST_GROUPS && packet.load(simd, rays, &PacketLimits::NONE) {
-            packet.trace::<S, WatertightTest, Q>(simd, &tree);
-            packet.store::<Q>(hits, 0);
-            places.copy_from_slice(&packet.place[..places.len()]);
-        } else {
-            meshlets::trace_blocks::<S, WatertightTest, Q>(simd, &tree, rays, hits, 0, places);
-        }
     }
 }
