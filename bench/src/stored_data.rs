@@ -6,8 +6,10 @@ use datasets::generate::mixing_layer::{self, MixingLayer};
 use datasets::generate::nested_wavelet::{POINTS, isovalues_for};
 use datasets::generate::wavelet::Wavelet;
 use datasets::isosurface::{self, Options, PlaneSource};
-use datasets::stored_volume;
+use datasets::{stored_mesh, stored_volume};
 use rayon::prelude::*;
+use rt_core::bvh::StoredMeshReport;
+use rt_core::glam::DVec3;
 use rt_core::grid::Grid;
 use rt_core::mesh::TriMesh;
 use rt_core::stored_volume::{StoredVolumeReport, ValueType, VolumeLayout};
@@ -111,6 +113,27 @@ pub struct WaveletSurface {
     pub share: f64,
     /// Its triangles.
     pub mesh: TriMesh,
+}
+
+/// Stores the nested isosurfaces of the wavelet, without normals, in pieces of which `memory` bytes
+/// wait at a time. `progress` gets each surface before it is stored; an error of it ends the work.
+///
+/// # Errors
+/// Those of `progress`, and when the wavelet cannot be made or the file not be written.
+pub fn store_wavelet(
+    path: &Path,
+    millions: u32,
+    memory: usize,
+    progress: &mut dyn FnMut(&WaveletSurface) -> anyhow::Result<()>,
+) -> anyhow::Result<StoredMeshReport> {
+    let mut writer = stored_mesh::create(path, DVec3::ZERO)?;
+    writer.set_memory(memory);
+    for surface in wavelet_surfaces(millions, false)? {
+        let surface = surface?;
+        progress(&surface)?;
+        writer.add_mesh(&surface.mesh)?;
+    }
+    Ok(stored_mesh::finish(writer)?)
 }
 
 /// Nested isosurfaces of the wavelet, one after the other: the dissertation's scaling series

@@ -7,16 +7,13 @@ use crate::control_group::ControlGroup;
 use crate::record::{Record, Row};
 use crate::runner::{Ratio, VERDICT_ROUNDS, order};
 use crate::stats::Summary;
-use crate::stored_data::wavelet_surfaces;
+use crate::stored_data::store_wavelet;
 use anyhow::Context as _;
 use datasets::catalogue;
-use datasets::stored_mesh;
 use datasets::view::View;
-use rt_core::glam::DVec3;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::time::Instant;
 
 /// Passes over the image of one program: a sample a pixel each, the first of which reads most.
 const PASSES: u32 = 16;
@@ -24,6 +21,9 @@ const PASSES: u32 = 16;
 const QUARTER: u64 = 4;
 /// What a program takes at least: its code, the image, and the tree over the pages.
 const LEAST: u64 = 128 << 20;
+
+/// Bytes for triangles that wait to be stored.
+const STORING: usize = 2 << 30;
 
 /// What limits the program.
 const LIMITED: &str = "a quarter of the file";
@@ -55,7 +55,10 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     ));
     let folder = tempfile::tempdir()?;
     let file = folder.path().join("wavelet.rtmesh");
-    let (triangles, bytes) = store(context, &file, millions)?;
+    let stored = store_wavelet(&file, millions, STORING, &mut |surface| {
+        context.report_share(format!("storing {}", surface.label), 0.7 * surface.share)
+    })?;
+    let (triangles, bytes) = (stored.triangles, stored.bytes);
     let limit = (bytes / QUARTER).max(LEAST);
     if limit > bytes / QUARTER {
         record.missing.push(format!(
@@ -106,21 +109,6 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         record.ratios.extend(Ratio::of_rounds(name, "without a limit", &per_round));
     }
     Ok(())
-}
-
-/// Makes the file. Returns the number of triangles and of bytes.
-fn store(context: &mut Context<'_>, path: &Path, millions: u32) -> anyhow::Result<(u64, u64)> {
-    let start = Instant::now();
-    let mut writer = stored_mesh::create(path, DVec3::ZERO)?;
-    writer.set_memory(2 << 30);
-    for surface in wavelet_surfaces(millions, false)? {
-        let surface = surface?;
-        context.report_share(format!("storing {}", surface.label), 0.7 * surface.share)?;
-        writer.add_mesh(&surface.mesh)?;
-    }
-    let report = stored_mesh::finish(writer)?;
-    context.report_step(format!("stored in {:.0} s", start.elapsed().as_secs_f64()))?;
-    Ok((report.triangles, report.bytes))
 }
 
 /// Writes the view as a camera for `bench render`.

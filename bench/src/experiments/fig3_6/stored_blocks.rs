@@ -6,7 +6,7 @@ use super::super::Context;
 use super::super::many_ranks::{frames_of, with_cost};
 use super::{HEADLIGHT, LIT, LOCAL, OCCLUSION_RAYS, secondary_rays_of};
 use crate::record::{Record, Row};
-use crate::stored_data::wavelet_surfaces;
+use crate::stored_data::store_wavelet;
 use anyhow::Context as _;
 use composite::Communicator as _;
 use composite::comm::sim::SimComm;
@@ -28,6 +28,8 @@ const MILLIONS: u32 = 49;
 const SIDE: f64 = 200.0;
 /// Bytes of pages that a rank keeps.
 const BUDGET: usize = 128 << 20;
+/// Bytes for triangles that wait to be stored.
+const STORING: usize = 2 << 30;
 /// Vertical angle of view, in degrees.
 const ANGLE: f64 = 30.0;
 
@@ -53,17 +55,6 @@ fn camera(blocks: UVec3) -> anyhow::Result<Camera> {
     let eye = distance * DVec3::new(-0.55, -0.75, 0.4).normalize();
     let limits = [1e-3 * distance, distance + 2.0 * radius];
     Ok(Camera::perspective(eye, DVec3::ZERO, DVec3::Z, angle, 1.0, limits)?)
-}
-
-fn store(context: &mut Context<'_>, path: &Path) -> anyhow::Result<u64> {
-    let mut writer = stored_mesh::create(path, DVec3::ZERO)?;
-    writer.set_memory(2 << 30);
-    for surface in wavelet_surfaces(MILLIONS, false)? {
-        let surface = surface?;
-        context.report_step(format!("storing {}", surface.label))?;
-        writer.add_mesh(&surface.mesh)?;
-    }
-    Ok(stored_mesh::finish(writer)?.triangles)
 }
 
 /// The part of one rank.
@@ -102,7 +93,10 @@ pub(super) fn run(
     ));
     let folder = tempfile::tempdir()?;
     let path = folder.path().join("block.rtmesh");
-    let of_rank = store(context, &path)?;
+    let stored = store_wavelet(&path, MILLIONS, STORING, &mut |surface| {
+        context.report_step(format!("storing {}", surface.label))
+    })?;
+    let of_rank = stored.triangles;
     let render = RenderOptions::new(pixels, pixels);
     for ranks in ranks {
         let blocks = blocks(ranks);

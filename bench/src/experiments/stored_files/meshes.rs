@@ -4,7 +4,7 @@
 use super::frames::{Pictured, Timed, frames};
 use super::{BUDGET, Context, Folder, Opened, Sizes, open_or_make};
 use crate::record::{Record, Row};
-use crate::stored_data::{mixing_layer_pieces, surface_pieces, wavelet_surfaces};
+use crate::stored_data::{mixing_layer_pieces, store_wavelet, surface_pieces};
 use anyhow::Context as _;
 use datasets::catalogue::{self, SEED};
 use datasets::generate::mixing_layer::MixingLayer;
@@ -74,28 +74,26 @@ impl Stored {
     }
 
     fn store(self, context: &mut Context<'_>, sizes: &Sizes, path: &Path) -> anyhow::Result<()> {
+        if let Stored::Wavelet = self {
+            store_wavelet(path, sizes.wavelet, STORING, &mut |surface| {
+                let share = 0.4 + 0.5 * surface.share;
+                context.report_share(format!("storing {}", surface.label), share)
+            })?;
+            return Ok(());
+        }
         let mut writer = stored_mesh::create(path, DVec3::ZERO)?;
         writer.set_memory(STORING);
-        let mut add = |mesh: TriMesh| -> anyhow::Result<()> { Ok(writer.add_mesh(&mesh)?) };
+        let add = |mesh: TriMesh| -> anyhow::Result<()> { Ok(writer.add_mesh(&mesh)?) };
         let options = Options { normals: false, ..Options::default() };
         let mut progress = |done: u32, all: u32| {
             let share = 0.4 + 0.5 * f64::from(done) / f64::from(all);
             context.report_share(format!("storing plane {done} of {all}"), share)
         };
-        match self {
-            Stored::Wavelet => {
-                for surface in wavelet_surfaces(sizes.wavelet, false)? {
-                    let surface = surface?;
-                    let share = 0.4 + 0.5 * surface.share;
-                    context.report_share(format!("storing {}", surface.label), share)?;
-                    add(surface.mesh)?;
-                }
-            }
-            Stored::MixingLayer => mixing_layer_pieces(sizes.layer, options, &mut progress, add)?,
-            Stored::Plasma => {
-                let plasma = Plasma::new(sizes.plasma, SEED);
-                surface_pieces(&plasma, plasma::ISO, options, &mut progress, add)?;
-            }
+        if let Stored::MixingLayer = self {
+            mixing_layer_pieces(sizes.layer, options, &mut progress, add)?;
+        } else {
+            let plasma = Plasma::new(sizes.plasma, SEED);
+            surface_pieces(&plasma, plasma::ISO, options, &mut progress, add)?;
         }
         stored_mesh::finish(writer)?;
         Ok(())
