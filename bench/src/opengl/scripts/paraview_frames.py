@@ -15,6 +15,8 @@ shown.ColorArrayName = ["POINTS", ""]
 view.ResetCamera()
 camera = view.GetActiveCamera()
 if at:
+    # The first frame of a view sees all of the data, whatever its camera.
+    Render(view)
     view.CameraPosition, view.CameraFocalPoint = at[0:3], at[3:6]
     view.CameraViewUp, view.CameraViewAngle = at[6:9], at[9]
 else:
