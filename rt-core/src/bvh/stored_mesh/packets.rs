@@ -45,7 +45,11 @@ impl PacketShape for StoredMesh {
             return false;
         }
         self.with_page(page, |page| {
-            packet.trace_part::<S, WatertightTest, Q>(simd, &page.view(), part, found);
+            // The cache calls this from functions that have no instruction set.
+            simd.vectorize(
+                #[inline(always)]
+                || packet.trace_part::<S, WatertightTest, Q>(simd, &page.view(), part, found),
+            );
         });
         true
     }
