@@ -96,11 +96,7 @@ impl Program {
             Ok(file.to_string_lossy().into_owned())
         };
         let size = drawing.size_px.to_string();
-        let camera = drawing.view.into_iter().flat_map(|view| {
-            let ends = [view.eye, view.target, view.up].map(|v| v.to_array());
-            let numbers = ends.as_flattened().iter().copied().chain([view.vertical_fov_degrees]);
-            numbers.map(|number| number.to_string()).collect::<Vec<_>>()
-        });
+        let camera = drawing.view.map(camera_argument);
         let mut arguments = match self {
             Program::Gmsh => {
                 vec![script("gmsh_frames.py", include_str!("scripts/gmsh_frames.py"))?, data, size]
@@ -153,4 +149,31 @@ impl Program {
 pub fn find(variable: &str, place: &str) -> Option<PathBuf> {
     let named = std::env::var_os(variable).map(PathBuf::from);
     named.or_else(|| Some(PathBuf::from(place))).filter(|p| p.is_file())
+}
+
+/// A view as one word: position, focal point, up and angle. pvbatch would take a word that begins
+/// with a minus sign for an option of its own, and change it.
+fn camera_argument(view: &View) -> String {
+    let ends = [view.eye, view.target, view.up].map(|v| v.to_array());
+    let numbers = ends.as_flattened().iter().copied().chain([view.vertical_fov_degrees]);
+    let words: Vec<String> = numbers.map(|number| number.to_string()).collect();
+    format!("camera={}", words.join(","))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rt_core::glam::DVec3;
+
+    #[test]
+    fn a_camera_behind_the_origin_is_no_option_of_the_program() {
+        let view = View {
+            name: "behind".into(),
+            eye: DVec3::new(-18.5, 0.25, -3.0),
+            target: DVec3::NEG_X,
+            up: DVec3::Z,
+            vertical_fov_degrees: 30.0,
+        };
+        assert_eq!(camera_argument(&view), "camera=-18.5,0.25,-3,-1,0,0,0,0,1,30");
+    }
 }

@@ -1,12 +1,12 @@
 """Frames of ParaView, one for each line that comes; for pvbatch. Arguments: the file, pixels a
-side, and for a view of its own the camera: position, focal point, up, angle."""
+side, and for a view of its own `camera=` with position, focal point, up and angle."""
 import itertools, os, sys
 from paraview.simple import *
 from vtkmodules.vtkIOImage import vtkPNMWriter
 from vtkmodules.vtkRenderingCore import vtkWindowToImageFilter
 
 file, size = sys.argv[1], int(sys.argv[2])
-at = [float(number) for number in sys.argv[3:]]
+at = [float(number) for word in sys.argv[3:] for number in word.removeprefix("camera=").split(",")]
 reader = XMLPolyDataReader(FileName=[file])
 view = CreateRenderView(ViewSize=[size, size])
 shown = Show(reader, view)

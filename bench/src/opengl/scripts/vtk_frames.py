@@ -1,10 +1,10 @@
 """Frames of a VTK program in Python, one for each line that comes. Arguments: the file, pixels a
-side, and for a view of its own the camera: position, focal point, up, angle."""
+side, and for a view of its own `camera=` with position, focal point, up and angle."""
 import itertools, sys
 import vtk
 
 file, size = sys.argv[1], int(sys.argv[2])
-view = [float(number) for number in sys.argv[3:]]
+view = [float(number) for word in sys.argv[3:] for number in word.removeprefix("camera=").split(",")]
 reader = vtk.vtkXMLPolyDataReader()
 reader.SetFileName(file)
 mapper = vtk.vtkPolyDataMapper()
