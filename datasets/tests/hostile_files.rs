@@ -3,6 +3,7 @@
 
 mod sample_files;
 
+use datasets::read::vtk_xml::CellPieces;
 use datasets::read::{self, Content, LoadedFile, ReadError};
 use peak_alloc::PeakAlloc;
 use proptest::prelude::*;
@@ -31,6 +32,7 @@ fn read_and_use(name: &str, bytes: &[u8]) -> Result<LoadedFile, ReadError> {
     let path = dir.path().join(name);
     std::fs::write(&path, bytes).unwrap();
     let opened = open_and_use(&path);
+    within_memory(|| use_cells_in_pieces(&path));
     if let Err(e) = &opened {
         let text = e.to_string();
         // A damaged name of another file gives an error about that file.
@@ -60,6 +62,18 @@ fn use_all(opened: &LoadedFile) {
             data.to_points(Some(name)),
             data.to_grid(name),
         );
+    }
+}
+
+/// Reads the cells of a file three at a time. Errors are allowed, panics are not.
+fn use_cells_in_pieces(path: &Path) {
+    let is_meant = path.extension().is_some_and(|e| e == "vtp" || e == "vtu");
+    let Ok(Some(mut pieces)) = (if is_meant { CellPieces::open(path, 3) } else { Ok(None) }) else {
+        return;
+    };
+    let _ = (pieces.origin(), pieces.find_shared_faces(|_| Ok::<_, ReadError>(())));
+    while let Some(Ok(piece)) = pieces.next_piece() {
+        use_all(&piece.file);
     }
 }
 

@@ -1,19 +1,26 @@
 //! Files that are larger than the memory for them: read in pieces and stored, they take no more
 //! than a stated budget.
 
+use datasets::model::{Dataset, Points, UnstructuredGrid};
 use datasets::read::obj_pieces::ObjPieces;
 use datasets::read::ply_pieces::PlyPieces;
 use datasets::read::stl_pieces::StlPieces;
-use datasets::read::{Content, LoadedFile};
+use datasets::read::vtk_xml::CellPieces;
+use datasets::read::{Content, LoadedFile, ReadError};
 use datasets::stored_mesh;
+use datasets::write::{VtkOptions, write_vtk};
 use peak_alloc::PeakAlloc;
 use rt_core::glam::DVec3;
 use rt_core::mesh::TriMesh;
 use std::io::{BufWriter, Write as _};
 use std::path::Path;
+use std::sync::{Mutex, PoisonError};
 
 #[global_allocator]
 static ALLOCATED: PeakAlloc = PeakAlloc;
+
+/// The tests measure the process, so they run one at a time.
+static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
 
 /// Vertices along an edge of the sheet, which is written several times over.
 const EDGE: u32 = 120;
@@ -72,6 +79,7 @@ fn mesh_of(file: LoadedFile) -> TriMesh {
 
 #[test]
 fn files_of_several_times_the_budget_are_stored_within_it() {
+    let _turn = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
     let dir = tempfile::tempdir().unwrap();
     let of = |name: &str| dir.path().join(name);
     let times = |bytes: usize| (2 * BUDGET).div_ceil(2 * bytes * (EDGE as usize - 1).pow(2)) + 1;
@@ -116,4 +124,54 @@ fn files_of_several_times_the_budget_are_stored_within_it() {
     ALLOCATED.reset_peak_usage();
     let pieces = StlPieces::open(&path, PIECE).unwrap().expect("binary");
     store_within_budget(&path, count(many), pieces.map(Result::unwrap));
+}
+
+/// Cells of a solid beam along an edge, and along the other.
+const BEAM: [usize; 2] = [24, 500];
+
+/// A beam of hexahedra, long enough for a file that is a multiple of the budget.
+fn beam() -> Dataset {
+    let [edge, length] = BEAM;
+    let n = edge + 1;
+    let point = |i: usize| [i % n, i / n % n, i / (n * n)].map(|x| x as f32);
+    let points = (0..n * n * (length + 1)).map(point).collect();
+    let mut grid = UnstructuredGrid { points: Points::F32(points), ..UnstructuredGrid::default() };
+    for cell in 0..edge * edge * length {
+        let [x, y, z] = [cell % edge, cell / edge % edge, cell / (edge * edge)];
+        let low = x + n * (y + n * z);
+        let square = [low, low + 1, low + 1 + n, low + n];
+        grid.cells.push(square.into_iter().chain(square.map(|k| k + n * n)).map(|k| k as u32));
+        grid.types.push(12);
+    }
+    Dataset::UnstructuredGrid(grid)
+}
+
+#[test]
+fn the_surface_of_solid_cells_is_stored_within_the_budget() {
+    let _turn = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
+    let dir = tempfile::tempdir().unwrap();
+    for (name, compress) in [("plain.vtu", false), ("packed.vtu", true)] {
+        let path = dir.path().join(name);
+        write_vtk(&path, &beam(), VtkOptions { compress, ..VtkOptions::default() }).unwrap();
+        let length = std::fs::metadata(&path).unwrap().len();
+        assert!(compress || length > 2 * BUDGET as u64, "{length} bytes");
+        ALLOCATED.reset_peak_usage();
+        let mut pieces = CellPieces::open(&path, PIECE).unwrap().expect("binary");
+        assert!(pieces.may_share_faces());
+        pieces.find_shared_faces(|_| Ok::<_, ReadError>(())).unwrap();
+        let stored = path.with_extension("rtmesh");
+        let mut writer = stored_mesh::create(&stored, DVec3::ZERO).unwrap();
+        writer.set_memory(WAITING);
+        while let Some(piece) = pieces.next_piece() {
+            let piece = piece.unwrap();
+            let (data, shared) = (piece.file.dataset().unwrap(), piece.shared_faces);
+            let mesh = data.to_trimesh_between(None, Some(DVec3::ZERO), shared.as_ref());
+            writer.add_mesh(&mesh.unwrap().0).unwrap();
+        }
+        let report = stored_mesh::finish(writer).unwrap();
+        let peak = ALLOCATED.peak_usage();
+        assert!(peak < BUDGET, "{name}: {} MiB", peak >> 20);
+        let [edge, length] = BEAM.map(|n| n as u64);
+        assert_eq!(report.triangles, 2 * (2 * edge * edge + 4 * edge * length));
+    }
 }

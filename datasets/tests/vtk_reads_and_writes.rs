@@ -3,9 +3,11 @@
 mod peer;
 mod sample_files;
 
-use datasets::model::{DataArray, Dataset, ScalarType};
+use datasets::model::{DataArray, Dataset, ScalarType, SharedFaces};
+use datasets::read::vtk_xml::CellPieces;
 use datasets::read::{Content, LoadedFile, ReadError, open};
 use datasets::write::{Encoding, VtkOptions, write_ply, write_vtk};
+use rt_core::mesh::PerElement;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -162,7 +164,7 @@ fn every_file_that_vtk_writes_is_read_as_vtk_reads_it() {
     let text = std::fs::read_to_string(dir.path().join("expected.json")).unwrap();
     let all: Value = serde_json::from_str(&text).unwrap();
     let files = all["files"].as_object().unwrap();
-    let (mut read, mut refused) = (0, 0);
+    let (mut read, mut refused, mut in_pieces) = (0, 0, 0);
     for (file, expected) in files {
         let path = dir.path().join(file);
         match open(&path) {
@@ -170,6 +172,12 @@ fn every_file_that_vtk_writes_is_read_as_vtk_reads_it() {
                 assert!(!file.contains("lzma"), "{file} cannot have been read");
                 compare(file, &opened, expected);
                 read += 1;
+                if is_read_in_pieces(&path, &opened) {
+                    in_pieces += 1;
+                } else {
+                    let is_text = file.contains("ascii");
+                    assert!(is_text || !file.starts_with("plain_"), "{file} is not read in pieces");
+                }
             }
             Err(e) => {
                 // LZMA is rejected by name, with a cure.
@@ -191,7 +199,48 @@ fn every_file_that_vtk_writes_is_read_as_vtk_reads_it() {
         all["vtk"]
     );
     assert!(read > 150 && refused > 0, "{read} {refused}");
+    assert_eq!(in_pieces, 2 * 3 * 3 * 4, "kinds, modes, compressors, headers and byte orders");
     check_series_and_blocks(dir.path());
+}
+
+/// Whether a file is read in pieces. These have the surface of the whole, bit for bit.
+fn is_read_in_pieces(path: &Path, whole: &LoadedFile) -> bool {
+    let is_meant = path.extension().is_some_and(|e| e == "vtp" || e == "vtu");
+    let opened = if is_meant { CellPieces::open(path, 7).unwrap() } else { None };
+    let Some(mut pieces) = opened else { return false };
+    pieces.find_shared_faces(|_| Ok::<_, ReadError>(())).unwrap();
+    let origin = pieces.origin().unwrap();
+    let triangles = |data: &Dataset, color: &str, shared: Option<&SharedFaces>| {
+        let (mesh, report) = data.to_trimesh_between(Some(color), Some(origin), shared).unwrap();
+        assert_eq!(report.dropped(), 0);
+        let scalars = mesh.scalars.as_ref().unwrap();
+        let value = |t: usize, corner: u32| match scalars.per {
+            PerElement::Vertex => scalars.values[corner as usize],
+            PerElement::Face => scalars.values[t],
+        };
+        let corners = mesh.indices.iter().enumerate().map(|(t, ids)| {
+            ids.map(|k| (mesh.positions[k as usize].to_array(), value(t, k)))
+                .map(|([x, y, z], value)| [x, y, z, value].map(f32::to_bits))
+        });
+        corners.collect::<Vec<_>>()
+    };
+    let colors = ["p_f32", "c_f64"];
+    let mut found = colors.map(|_| Vec::new());
+    let mut count = 0;
+    while let Some(piece) = pieces.next_piece() {
+        let piece = piece.unwrap();
+        count += 1;
+        for (found, color) in found.iter_mut().zip(colors) {
+            let data = piece.file.dataset().unwrap();
+            found.extend(triangles(data, color, piece.shared_faces.as_ref()));
+        }
+    }
+    assert!(count > 5, "{}: {count} pieces", path.display());
+    for (found, color) in found.iter().zip(colors) {
+        let expected = triangles(whole.dataset().unwrap(), color, None);
+        assert!(*found == expected, "{}: {color}", path.display());
+    }
+    true
 }
 
 fn check_series_and_blocks(dir: &Path) {

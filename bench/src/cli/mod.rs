@@ -9,6 +9,7 @@ mod render;
 mod report;
 mod run;
 mod store;
+mod store_cells;
 mod store_isosurface;
 mod store_job;
 mod store_volume;

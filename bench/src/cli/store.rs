@@ -2,21 +2,18 @@
 //! ([`super::store_volume`]).
 
 use super::store_job::StoreJob;
-use super::{StoreArgs, memory_budget, store_isosurface, store_volume};
+use super::{StoreArgs, memory_budget, store_cells, store_isosurface, store_volume};
 use crate::stored_data::{mixing_layer_pieces, wavelet_surfaces};
 use datasets::cli::{Cancel, CommonArgs, CureExt as _, UsageError};
 use datasets::isosurface::Options;
-use datasets::model::{PieceBoundaries, SharedFaces};
 use datasets::read::obj_pieces::ObjPieces;
 use datasets::read::ply_pieces::PlyPieces;
 use datasets::read::stl_pieces::StlPieces;
 use datasets::read::volume_planes::VolumePlanes;
 use datasets::read::vtk_xml::{PieceFiles, piece_files};
-use datasets::read::{Content, LoadedFile};
 use rt_core::bvh::StoredMeshReport;
 use serde_json::json;
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::path::Path;
 use std::time::Instant;
 
 pub(super) const EXAMPLES: &str = "\
@@ -76,6 +73,9 @@ pub(super) fn store(common: CommonArgs, args: &StoreArgs) -> anyhow::Result<()> 
 /// Triangles, or faces, of a file that is read in pieces.
 const PIECE: usize = 1 << 20;
 
+/// Extensions of files that name others, which are stored one by one.
+const LISTS: [&str; 5] = ["pvtp", "pvtu", "vtm", "vtpd", "vtpc"];
+
 /// The triangles of a file: in pieces where its format allows it, else mesh by mesh.
 fn store_file(
     common: CommonArgs,
@@ -110,7 +110,7 @@ fn store_file(
     } else if named("ply")
         && let Some(mut pieces) = PlyPieces::open(file, PIECE)?
     {
-        let (bar, origin) = (common.progress(pieces.faces(), "storing"), pieces.origin());
+        let (bar, origin) = (common.progress(pieces.faces(), "storing"), pieces.origin()?);
         while let Some(piece) = pieces.next() {
             job.add_file(file, &piece?, Some(origin))?;
             bar.set_position(pieces.faces_read());
@@ -147,21 +147,12 @@ fn store_file(
                 "{count} faces cross themselves or are too large, and were divided as a fan"
             ));
         }
-    } else if (named("pvtp") || named("pvtu"))
+    } else if LISTS.into_iter().any(named)
         && let Some(PieceFiles { files, .. }) = piece_files(file)?
     {
-        let between = if named("pvtu") { faces_between(common, &mut job, &files)? } else { None };
-        let bar = common.progress(files.len() as u64, "storing");
-        for piece in &files {
-            let opened = datasets::read::open(piece)?;
-            // A process without a part of the data writes a piece without cells, and often
-            // without the arrays of the others.
-            if !is_empty(&opened) {
-                job.add_piece(piece, &opened, between.clone())?;
-            }
-            bar.inc(1);
-        }
-    } else {
+        let is_divided = named("pvtu");
+        store_cells::of_files(&mut job, common, args, &files, is_divided, memory)?;
+    } else if !store_cells::of_file(&mut job, common, args, file, memory)? {
         let opened = datasets::read::open(file)?;
         match store_isosurface::field_of(args, &opened)? {
             Some(field) => store_isosurface::of_field(&mut job, args, file, &field)?,
@@ -169,61 +160,6 @@ fn store_file(
         }
     }
     job.finish(file)
-}
-
-/// The faces between pieces of solid cells that have no ghost cells: each piece is read once for
-/// them. `None` where ghost cells tell.
-fn faces_between(
-    common: CommonArgs,
-    job: &mut StoreJob<'_>,
-    files: &[PathBuf],
-) -> anyhow::Result<Option<Arc<SharedFaces>>> {
-    let bar = common.progress(files.len() as u64, "faces between the pieces");
-    let (mut boundaries, mut without_copies) = (PieceBoundaries::default(), 0);
-    for file in files {
-        let opened = datasets::read::open(file)?;
-        if let Content::Data(data) = &opened.content
-            && !is_empty(&opened)
-            && !has_ghost_cells(&opened)
-        {
-            without_copies += 1;
-            boundaries.add(data);
-        }
-        bar.inc(1);
-    }
-    if without_copies < 2 {
-        return Ok(None);
-    }
-    let shared = boundaries.shared_faces();
-    if shared.is_empty() {
-        job.warn_once(format!(
-            "{without_copies} pieces have no ghost cells and no face in common: should they touch \
-             one another, the faces between them are stored too; ParaView's filter Ghost Cells \
-             adds such cells"
-        ));
-    }
-    common.note(1, format_args!("{} faces between pieces are left out", shared.len()));
-    Ok(Some(Arc::new(shared)))
-}
-
-/// Whether a file has no cells.
-fn is_empty(opened: &LoadedFile) -> bool {
-    match &opened.content {
-        Content::Data(data) => data.leaves().iter().all(|leaf| leaf.counts().1 == 0),
-        Content::Scene(_) => false,
-    }
-}
-
-/// Whether a piece says which of its cells are copies of another piece's.
-fn has_ghost_cells(opened: &LoadedFile) -> bool {
-    match &opened.content {
-        Content::Data(data) => data
-            .leaves()
-            .iter()
-            .filter_map(|leaf| leaf.attributes())
-            .any(|attributes| attributes.cell_array("vtkGhostType").is_some()),
-        Content::Scene(_) => false,
-    }
 }
 
 /// See [`mixing_layer_pieces`].

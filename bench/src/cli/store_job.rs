@@ -5,7 +5,6 @@ use super::mesh_file::with_origin;
 use crate::image::subject::{LoadOptions, PartColoring, Subject};
 use anyhow::Context as _;
 use datasets::cli::{Cancel, CommonArgs, ProgressBar, UsageError};
-use datasets::model::SharedFaces;
 use datasets::read::LoadedFile;
 use datasets::{PagedFile, stored_mesh};
 use rt_core::bvh::{Geometry, StoredMeshReport, StoredMeshWriter};
@@ -13,7 +12,6 @@ use rt_core::glam::DVec3;
 use rt_core::mesh::{MeshSlices, TriMesh};
 use std::collections::HashSet;
 use std::path::Path;
-use std::sync::Arc;
 
 /// A file that is being written.
 pub(super) struct StoreJob<'a> {
@@ -72,21 +70,24 @@ impl<'a> StoreJob<'a> {
         opened: &LoadedFile,
         origin: Option<DVec3>,
     ) -> anyhow::Result<()> {
-        self.add_loaded(file, opened, &LoadOptions { origin, ..LoadOptions::default() })
+        let color_by = self.args.color_by.clone();
+        self.add_loaded(file, opened, &LoadOptions { origin, color_by, ..LoadOptions::default() })
     }
 
-    /// Adds the meshes of one of several files, which may have none, without the faces that it
-    /// shares with others.
+    /// Adds the meshes of one of several files, which may have none. The options' origin is that of
+    /// the first mesh, where none is given.
     pub(super) fn add_piece(
         &mut self,
         file: &Path,
         opened: &LoadedFile,
-        shared_faces: Option<Arc<SharedFaces>>,
+        options: &LoadOptions,
     ) -> anyhow::Result<()> {
-        let origin = self.origin();
-        let options =
-            LoadOptions { origin, without_points: true, shared_faces, ..LoadOptions::default() };
-        self.add_loaded(file, opened, &options)
+        let origin = options.origin.or(self.origin());
+        self.add_loaded(
+            file,
+            opened,
+            &LoadOptions { origin, without_points: true, ..options.clone() },
+        )
     }
 
     fn add_loaded(
@@ -104,8 +105,7 @@ impl<'a> StoreJob<'a> {
             );
             return Err(UsageError(text).into());
         }
-        let options = LoadOptions { color_by: self.args.color_by.clone(), ..options.clone() };
-        let subject = Subject::from_file(opened, &options)
+        let subject = Subject::from_file(opened, options)
             .with_context(|| format!("{}: no triangles to store", file.display()))?;
         for warning in subject.warnings {
             self.warn_once(warning);

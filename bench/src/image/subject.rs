@@ -420,7 +420,7 @@ fn add_volume(
 }
 
 /// The array that a file marks as its scalars.
-fn marked_array(data: &Dataset) -> Option<String> {
+pub fn marked_array(data: &Dataset) -> Option<String> {
     let a = data.leaves().into_iter().find_map(|d| d.attributes())?;
     a.point_scalars.clone().or_else(|| a.cell_scalars.clone())
 }

@@ -1,15 +1,17 @@
 //! Finds the faces that pieces of a data set share, where no ghost cells mark them as interior.
 //!
 //! A face is known by the coordinates of its corners, in any order: processes that divide a mesh
-//! write the same numbers for a point that they share. Of each boundary face of a piece, 16 bytes
-//! are kept, so the pieces themselves may be read one after the other.
+//! write the same numbers for a point that they share. Pieces of one mesh that number its points
+//! alike know a face by these numbers instead, as the mesh does. Of each boundary face of a piece,
+//! 24 bytes are kept, so the pieces themselves may be read one after the other.
 
 use super::boundary_faces::BoundaryFaces;
 use super::surface::GhostFlags;
-use super::{CellType, Dataset};
+use super::{CellType, Dataset, Points};
 use glam::DVec3;
 use rayon::slice::ParallelSliceMut;
 use rt_core::math::mix64;
+use std::sync::Arc;
 
 /// Identifies a face: a hash of its corners.
 type CornerHash = [u64; 2];
@@ -27,7 +29,10 @@ pub struct PieceBoundaries {
 #[derive(Debug, Clone, Default)]
 pub struct SharedFaces {
     /// In ascending order.
-    faces: Vec<CornerHash>,
+    faces: Arc<[CornerHash]>,
+    /// The numbers that one piece's points have in the whole; without them, points are known by
+    /// their coordinates.
+    numbers: Option<Vec<u64>>,
 }
 
 impl PieceBoundaries {
@@ -35,6 +40,16 @@ impl PieceBoundaries {
     /// that the piece has copies of (`vtkGhostType`) count as its own, as in
     /// [`Dataset::to_trimesh`].
     pub fn add(&mut self, piece: &Dataset) {
+        self.add_known_by(piece, None);
+    }
+
+    /// [`Self::add`] for a piece of one mesh: `numbers` says which of the mesh's points each of
+    /// its points is.
+    pub fn add_numbered(&mut self, piece: &Dataset, numbers: &[u64]) {
+        self.add_known_by(piece, Some(numbers));
+    }
+
+    fn add_known_by(&mut self, piece: &Dataset, numbers: Option<&[u64]>) {
         self.pieces += 1;
         for leaf in piece.leaves() {
             let Dataset::UnstructuredGrid(d) = leaf else { continue };
@@ -52,8 +67,7 @@ impl PieceBoundaries {
                 }
                 outside.of_cell(d, cell, &mut faces);
                 for ids in &faces {
-                    let corners = ids.iter().map(|&k| d.points.get(k as usize));
-                    self.faces.push((corner_hash(corners), self.pieces));
+                    self.faces.push((face_hash(ids, &d.points, numbers), self.pieces));
                 }
             }
         }
@@ -64,7 +78,7 @@ impl PieceBoundaries {
         self.faces.par_sort_unstable();
         let of_two = |same: &&[(CornerHash, u32)]| same.iter().any(|face| face.1 != same[0].1);
         let same = self.faces.chunk_by(|a, b| a.0 == b.0).filter(of_two);
-        SharedFaces { faces: same.map(|same| same[0].0).collect() }
+        SharedFaces { faces: same.map(|same| same[0].0).collect(), numbers: None }
     }
 }
 
@@ -79,16 +93,28 @@ impl SharedFaces {
         self.faces.is_empty()
     }
 
+    /// The same faces for one piece of those that [`PieceBoundaries::add_numbered`] was told of.
+    pub fn of_numbered(&self, numbers: Vec<u64>) -> SharedFaces {
+        SharedFaces { faces: Arc::clone(&self.faces), numbers: Some(numbers) }
+    }
+
     /// Whether the face with these corners is one of them.
-    pub(super) fn contains(&self, corners: impl Iterator<Item = DVec3>) -> bool {
-        self.faces.binary_search(&corner_hash(corners)).is_ok()
+    pub(super) fn contains(&self, ids: &[u32], points: &Points) -> bool {
+        self.faces.binary_search(&face_hash(ids, points, self.numbers.as_deref())).is_ok()
     }
 }
 
-fn corner_hash(corners: impl Iterator<Item = DVec3>) -> CornerHash {
-    // -0 and 0 are one place.
-    let mut all: Vec<[u64; 3]> =
-        corners.map(|p| (p + DVec3::ZERO).to_array().map(f64::to_bits)).collect();
+fn face_hash(ids: &[u32], points: &Points, numbers: Option<&[u64]>) -> CornerHash {
+    let mut all: Vec<[u64; 3]> = match numbers {
+        Some(numbers) => {
+            ids.iter().map(|&k| [numbers.get(k as usize).map_or(u64::MAX, |&n| n), 0, 0]).collect()
+        }
+        // -0 and 0 are one place.
+        None => ids
+            .iter()
+            .map(|&k| (points.get(k as usize) + DVec3::ZERO).to_array().map(f64::to_bits))
+            .collect(),
+    };
     all.sort_unstable();
     [0x9e37_79b9_7f4a_7c15, 0xd1b5_4a32_d192_ed03]
         .map(|seed| all.iter().flatten().fold(seed, |hash: u64, bits| mix64(hash ^ bits)))

@@ -366,7 +366,7 @@ impl Builder {
                     }
                     if let Some(shared) = shared {
                         let found = outer.len();
-                        outer.retain(|ids| !shared.contains(ids.iter().map(|&k| at(k as usize))));
+                        outer.retain(|ids| !shared.contains(ids, &d.points));
                         self.report.shared_faces += found - outer.len();
                     }
                     outer.iter().for_each(|ids| self.polygon(ids, cell, &at, &from));

@@ -215,6 +215,15 @@ pub(crate) fn io_error(path: &Path, source: std::io::Error) -> ReadError {
     ReadError::Io { path: path.to_path_buf(), source, cure: cure.into() }
 }
 
+/// The fault of an array that could not be read from the disk.
+pub(crate) fn io_fault(array: &str, source: std::io::Error) -> Fault {
+    let cure = match source.kind() {
+        std::io::ErrorKind::UnexpectedEof => TRUNCATED,
+        _ => "check the disk",
+    };
+    Fault::new(At::Field(format!("array `{array}`")), format!("it cannot be read: {source}"), cure)
+}
+
 /// Resolves the name of another file relative to the file that contains it. Absolute names and
 /// names that leave the directory are allowed: the formats allow them and the user opened the file.
 pub(crate) fn sibling_path(path: &Path, name: &str) -> PathBuf {

@@ -30,6 +30,7 @@ pub(crate) mod percent;
 pub mod plot3d;
 pub mod ply;
 pub mod ply_pieces;
+mod ply_vertices;
 pub mod raw;
 mod refinement;
 pub mod scene;

@@ -1,29 +1,28 @@
 //! Binary PLY files piece by piece, for those that are larger than memory: scans of hundreds of
 //! millions of triangles are kept so.
 //!
-//! All vertices are in memory, because faces name any of them: 12 bytes each for positions, which
-//! is 6 bytes per triangle. Faces are read a piece at a time.
+//! Faces are read a piece at a time, and with each piece the vertices that its faces name. Vertices
+//! that follow the faces' order are read about once; in the worst order each piece reads all.
 
 use super::error::{At, BROKEN, Cursor, Fault, TRUNCATED, io_error};
-use super::ply::{Element, Encoding, FORMAT, Property, faces, header, is_corners, rows, vertices};
+use super::ply::{Element, Encoding, FORMAT, Property, faces, header, is_corners, rows};
+use super::ply_vertices::PlyVertices;
 use super::{Content, LoadedFile, ReadError};
-use crate::model::{Cells, DataArray, Dataset, Endian, Points, PolyData, Values};
+use crate::model::{Cells, Dataset, Endian, PolyData, Values};
 use glam::DVec3;
+use rayon::slice::ParallelSliceMut;
 use rt_core::mesh::TriMesh;
-use std::collections::HashMap;
 use std::fs::File;
 use std::io::{BufReader, Read as _, Seek as _, SeekFrom};
 use std::path::{Path, PathBuf};
 
 /// Longest header that is looked for.
 const MOST_HEADER: u64 = 1 << 16;
-/// Vertices that are read at once.
-const VERTICES_AT_ONCE: usize = 1 << 18;
 /// Most corners of a face. Longer ones are a broken file's.
 const MOST_CORNERS: u64 = 1 << 16;
 
 /// The faces of a binary PLY file, in pieces. Each has the vertices that it uses, with all of their
-/// properties, in the order in which its faces name them.
+/// properties, in the order of the file.
 ///
 /// ```
 /// # use datasets::read::ply_pieces::PlyPieces;
@@ -39,7 +38,7 @@ const MOST_CORNERS: u64 = 1 << 16;
 pub struct PlyPieces {
     file: BufReader<File>,
     path: PathBuf,
-    vertices: PolyData,
+    vertices: PlyVertices,
     element: Element,
     endian: Endian,
     /// Faces read so far, and the byte after them.
@@ -49,15 +48,14 @@ pub struct PlyPieces {
 }
 
 impl PlyPieces {
-    /// Opens a file and reads its vertices; faces come in pieces of `piece`, at least one. `None`
+    /// Opens a file and reads its header; faces come in pieces of `piece`, at least one. `None`
     /// for text, and for files with anything but one list of vertices and one of faces:
     /// [`super::ply::read`] reads these, and says what is wrong with broken ones.
     ///
     /// # Errors
-    /// When the file cannot be read, or its vertices are not as its header says.
+    /// When the file cannot be read, or its vertices have no position.
     pub fn open(path: &Path, piece: usize) -> Result<Option<PlyPieces>, ReadError> {
         let io = |e| io_error(path, e);
-        let fault = |f: Fault| f.in_file(path, FORMAT);
         let mut file = File::open(path).map_err(io)?;
         let length = file.metadata().map_err(io)?.len();
         let mut start = Vec::new();
@@ -78,26 +76,21 @@ impl PlyPieces {
         if vertex.name != "vertex" || element.name != "face" || !plain || !corners || !complete {
             return Ok(None);
         }
-        let (body, end) = (SeekFrom::Start(body), end.unwrap_or(0));
+        let end = end.unwrap_or(0);
+        let vertices = PlyVertices {
+            file: file.try_clone().map_err(io)?,
+            path: path.to_path_buf(),
+            element: vertex,
+            endian,
+            start: body,
+            row,
+        };
+        // Whether they have positions.
+        vertices.read(0..0)?;
         let mut file = BufReader::with_capacity(1 << 20, file);
-        file.seek(body).map_err(io)?;
-        let (mut all, mut left) = (PolyData::default(), vertex.count);
-        while left > 0 || all.points.is_empty() {
-            let count = left.min(VERTICES_AT_ONCE as u64);
-            let mut bytes = vec![0; (count * row) as usize];
-            file.read_exact(&mut bytes).map_err(io)?;
-            let some = Element { count, ..vertex.clone() };
-            let columns = rows(&mut Cursor::new(&bytes), &some, Encoding::Binary(endian));
-            let mut part = PolyData::default();
-            vertices(&some, columns.map_err(fault)?, &mut part).map_err(fault)?;
-            append(&mut all, part);
-            left -= count;
-            if count == 0 {
-                break;
-            }
-        }
+        file.seek(SeekFrom::Start(end)).map_err(io)?;
         let (path, piece) = (path.to_path_buf(), piece.max(1) as u64);
-        Ok(Some(PlyPieces { file, path, vertices: all, element, endian, read: 0, at: end, piece }))
+        Ok(Some(PlyPieces { file, path, vertices, element, endian, read: 0, at: end, piece }))
     }
 
     /// Faces of the file.
@@ -113,12 +106,12 @@ impl PlyPieces {
     /// What the positions of all pieces want to be relative to
     /// ([`crate::model::Dataset::to_trimesh_at`]): the origin that [`TriMesh::from_f64_positions`]
     /// chooses for the whole.
-    pub fn origin(&self) -> DVec3 {
-        let points = &self.vertices.points;
-        let all = (0..points.len()).map(|i| points.get(i)).filter(|p| p.is_finite());
-        let empty = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        let (low, high) = all.fold(empty, |(low, high), p| (low.min(p), high.max(p)));
-        TriMesh::from_f64_positions(&[low, high], Vec::new()).origin
+    ///
+    /// # Errors
+    /// When the vertices cannot be read.
+    pub fn origin(&self) -> Result<DVec3, ReadError> {
+        let bounds = self.vertices.bounds()?;
+        Ok(TriMesh::from_f64_positions(&bounds, Vec::new()).origin)
     }
 
     fn next_piece(&mut self, count: u64) -> Result<LoadedFile, ReadError> {
@@ -137,7 +130,7 @@ impl PlyPieces {
         drop(bytes);
         let (mut piece, mut warnings) = (PolyData::default(), Vec::new());
         faces(&some, columns, &mut piece, &mut warnings).map_err(fault)?;
-        let missing = self.take_vertices(&mut piece).map_err(fault)?;
+        let missing = self.take_vertices(&mut piece)?;
         if missing > 0 {
             warnings
                 .push(format!("{missing} point ids do not exist; their faces will be left out"));
@@ -182,60 +175,32 @@ impl PlyPieces {
     }
 
     /// Gives a piece the vertices that its faces use. Returns how many numbers have none.
-    fn take_vertices(&self, piece: &mut PolyData) -> Result<usize, Fault> {
-        let count = self.vertices.points.len();
-        let (mut used, mut numbers) = (Vec::new(), HashMap::new());
+    fn take_vertices(&self, piece: &mut PolyData) -> Result<usize, ReadError> {
+        let exists = |&id: &u32| u64::from(id) < self.vertices.count();
+        let ids = piece.polys.connectivity();
+        let mut used: Vec<u32> = ids.iter().copied().filter(exists).collect();
+        used.par_sort_unstable();
+        used.dedup();
         let mut missing = 0;
-        let number = |&old: &u32| {
-            if old as usize >= count {
+        let place = |id: &u32| match used.binary_search(id) {
+            Ok(place) => place as u32,
+            Err(_) => {
                 missing += 1;
-                return u32::MAX;
+                Cells::NO_POINT
             }
-            *numbers.entry(old).or_insert_with(|| {
-                used.push(old as usize);
-                used.len() as u32 - 1
-            })
         };
-        let ids = piece.polys.connectivity().iter().map(number).collect();
+        let ids = ids.iter().map(place).collect();
         let ends = piece.polys.ends().iter().map(|&end| end as i64);
         piece.polys = Cells::from_ends(ends, ids)
-            .map_err(|b| Fault::field("element `face`", format!("face {} has no end", b.cell)))?;
-        piece.points = match &self.vertices.points {
-            Points::F32(all) => Points::F32(used.iter().map(|&i| all[i]).collect()),
-            Points::F64(all) => Points::F64(used.iter().map(|&i| all[i]).collect()),
-        };
-        let a = &self.vertices.attributes;
-        piece.attributes.point_normals = a.point_normals.clone();
-        piece.attributes.point_scalars = a.point_scalars.clone();
-        piece.attributes.point_texcoords = a.point_texcoords.clone();
-        piece.attributes.point = a
-            .point
-            .iter()
-            .map(|array| {
-                let n = array.components;
-                let of = used.iter().flat_map(|&i| n * i..n * (i + 1));
-                DataArray::new(array.name.clone(), n, array.values.gathered(of))
-            })
-            .collect();
+            .map_err(|b| Fault::field("element `face`", format!("face {} has no end", b.cell)))
+            .map_err(|f| f.in_file(&self.path, FORMAT))?;
+        let read = self.vertices.gathered(&used)?;
+        piece.points = read.points;
+        piece.attributes.point_normals = read.attributes.point_normals;
+        piece.attributes.point_scalars = read.attributes.point_scalars;
+        piece.attributes.point_texcoords = read.attributes.point_texcoords;
+        piece.attributes.point = read.attributes.point;
         Ok(missing)
-    }
-}
-
-/// Appends vertices with the same properties.
-fn append(all: &mut PolyData, part: PolyData) {
-    if all.points.is_empty() {
-        *all = part;
-        return;
-    }
-    match (&mut all.points, part.points) {
-        (Points::F32(all), Points::F32(part)) => all.extend(part),
-        (Points::F64(all), Points::F64(part)) => all.extend(part),
-        (Points::F32(_), Points::F64(_)) | (Points::F64(_), Points::F32(_)) => {
-            unreachable!("one header says what all vertices have")
-        }
-    }
-    for (all, part) in all.attributes.point.iter_mut().zip(part.attributes.point) {
-        all.values.append(&part.values);
     }
 }
 
@@ -354,7 +319,7 @@ mod tests {
         };
         let whole = whole.to_trimesh(None).unwrap().0;
         let parts = PlyPieces::open(&path, 50).unwrap().expect("binary");
-        let origin = parts.origin();
+        let origin = parts.origin().unwrap();
         assert!(origin == whole.origin && origin != DVec3::ZERO, "{origin}");
         let part = |p: Result<LoadedFile, ReadError>| {
             let Content::Data(data) = p.unwrap().content else { panic!("no data") };

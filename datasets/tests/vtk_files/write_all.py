@@ -147,10 +147,43 @@ def unstructured(polyhedra):
     return add_arrays(d, 5)
 
 
+def plain_poly():
+    sphere = vtk.vtkSphereSource()
+    sphere.SetThetaResolution(9)
+    sphere.SetPhiResolution(7)
+    sphere.Update()
+    d = vtk.vtkPolyData()
+    d.DeepCopy(sphere.GetOutput())
+    d.GetPointData().Initialize()
+    return add_arrays(d, 6)
+
+
+def plain_unstructured():
+    """Voxels, and beside them tetrahedra whose points at the border are their own."""
+    image = vtk.vtkImageData()
+    image.SetDimensions(5, 4, 4)
+    beside = vtk.vtkImageData()
+    beside.SetDimensions(3, 4, 4)
+    beside.SetOrigin(4, 0, 0)
+    tetrahedra = vtk.vtkDataSetTriangleFilter()
+    tetrahedra.SetInputData(beside)
+    both = vtk.vtkAppendFilter()
+    both.AddInputData(image)
+    both.AddInputConnection(tetrahedra.GetOutputPort())
+    both.Update()
+    d = vtk.vtkUnstructuredGrid()
+    d.DeepCopy(both.GetOutput())
+    return add_arrays(d, 7)
+
+
 DATA = {
     "vti": ("ImageData", image), "vtr": ("RectilinearGrid", rectilinear), "vts": ("StructuredGrid", structured),
     "vtp": ("PolyData", poly), "vtu": ("UnstructuredGrid", lambda: unstructured(True)),
 }
+
+
+# Of one kind of cells, with names of files that begin with `plain_`.
+PLAIN = {"vtp": ("PolyData", plain_poly), "vtu": ("UnstructuredGrid", plain_unstructured)}
 
 
 def describe(data):
@@ -223,7 +256,9 @@ def write(directory):
         expected[file] = describe(data)
 
     # XML: every mode, compressor, header and byte order.
-    for extension, (kind, make) in DATA.items():
+    data_sets = [("", extension, *made) for extension, made in DATA.items()]
+    data_sets += [("plain_", extension, *made) for extension, made in PLAIN.items()]
+    for prefix, extension, kind, make in data_sets:
         data = make()
         for mode in ["ascii", "binary", "appended", "raw"]:
             for compressor in ["none"] if mode == "ascii" else ["none", "zlib", "lz4", "lzma"]:
@@ -231,7 +266,7 @@ def write(directory):
                     for order in ["le", "be"]:
                         if (mode == "ascii" or compressor == "lzma") and (header, order) != (64, "le"):
                             continue
-                        file = f"{mode}_{compressor}_{header}_{order}.{extension}"
+                        file = f"{prefix}{mode}_{compressor}_{header}_{order}.{extension}"
                         w = getattr(vtk, f"vtkXML{kind}Writer")()
                         w.SetInputData(data)
                         w.SetFileName(os.path.join(directory, file))

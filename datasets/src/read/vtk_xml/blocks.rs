@@ -41,14 +41,7 @@ const MAX_RATIO: u64 = 1040;
 pub(crate) fn decode(stored: EncodedBytes<'_>, e: Encoding, name: &str) -> Result<Vec<u8>, Fault> {
     let mut source = Source::new(stored, name);
     let w = e.header_bytes;
-    let number = |bytes: &[u8]| -> u64 {
-        let mut b = [0u8; 8];
-        b[..w].copy_from_slice(bytes);
-        if e.endian == Endian::Big {
-            b[..w].reverse();
-        }
-        u64::from_le_bytes(b)
-    };
+    let number = |bytes: &[u8]| number(bytes, e.endian);
     let at = || At::Field(format!("array `{name}`"));
 
     if e.compressor == Compressor::None {
@@ -95,7 +88,7 @@ pub(crate) fn decode(stored: EncodedBytes<'_>, e: Encoding, name: &str) -> Resul
     fits(compressed, 1, source.most_bytes_left(), at(), "compressed bytes")?;
     let full = blocks as u64 - u64::from(last > 0);
     let total = full.checked_mul(block_size).and_then(|n| n.checked_add(last)).unwrap_or(u64::MAX);
-    if last > block_size || total > compressed.saturating_mul(MAX_RATIO) {
+    if last > block_size || total > most_from(compressed) {
         let what = format!(
             "{blocks} blocks of {block_size} bytes (last {last}) cannot come from {compressed} \
              compressed bytes"
@@ -112,30 +105,46 @@ pub(crate) fn decode(stored: EncodedBytes<'_>, e: Encoding, name: &str) -> Resul
             return Err(source.ended(&format!("block {i}")));
         };
         let want = if last > 0 && i + 1 == blocks { last } else { block_size } as usize;
-        let target = &mut out[done..done + want];
-        let got = match e.compressor {
-            Compressor::Zlib => inflate(block, target),
-            _ => lz4_flex::block::decompress_into(block, target).map_err(|e| e.to_string()),
-        };
-        match got {
-            Ok(n) if n == want => done += want,
-            Ok(n) => {
-                return Err(Fault::new(
-                    at(),
-                    format!("block {i} gives {n} bytes instead of {want}"),
-                    BROKEN,
-                ));
-            }
-            Err(e) => {
-                return Err(Fault::new(
-                    at(),
-                    format!("block {i} cannot be decompressed: {e}"),
-                    TRUNCATED,
-                ));
-            }
-        }
+        decompress(e.compressor, block, &mut out[done..done + want], i, name)?;
+        done += want;
     }
     Ok(out)
+}
+
+/// A number of 4 or 8 bytes in a header.
+pub(super) fn number(bytes: &[u8], endian: Endian) -> u64 {
+    let mut b = [0u8; 8];
+    b[..bytes.len()].copy_from_slice(bytes);
+    if endian == Endian::Big {
+        b[..bytes.len()].reverse();
+    }
+    u64::from_le_bytes(b)
+}
+
+/// The most bytes that so many compressed ones can give.
+pub(super) fn most_from(compressed: u64) -> u64 {
+    compressed.saturating_mul(MAX_RATIO)
+}
+
+/// Fills `target` from block `i` of the array `name`.
+pub(super) fn decompress(
+    compressor: Compressor,
+    block: &[u8],
+    target: &mut [u8],
+    i: usize,
+    name: &str,
+) -> Result<(), Fault> {
+    let want = target.len();
+    let got = match compressor {
+        Compressor::Zlib => inflate(block, target),
+        _ => lz4_flex::block::decompress_into(block, target).map_err(|e| e.to_string()),
+    };
+    let (what, cure) = match got {
+        Ok(n) if n == want => return Ok(()),
+        Ok(n) => (format!("block {i} gives {n} bytes instead of {want}"), BROKEN),
+        Err(e) => (format!("block {i} cannot be decompressed: {e}"), TRUNCATED),
+    };
+    Err(Fault::new(At::Field(format!("array `{name}`")), what, cure))
 }
 
 fn inflate(block: &[u8], target: &mut [u8]) -> Result<usize, String> {

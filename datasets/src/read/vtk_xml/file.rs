@@ -133,23 +133,13 @@ impl<'a> XmlFile<'a> {
         node: Node<'_, '_>,
         warnings: &mut Vec<String>,
     ) -> Result<Option<DataArray>, Fault> {
-        let name = node.attribute("Name").unwrap_or("").to_string();
-        let place = || At::Field(format!("array `{name}`"));
         let kind_name = node.attribute("type").unwrap_or("");
-        let Some(kind) = scalar_type(kind_name) else {
+        let Some((name, components, kind)) = array_description(node)? else {
+            let name = node.attribute("Name").unwrap_or("");
             warnings.push(format!("array `{name}` left out: type `{kind_name}` is not read"));
             return Ok(None);
         };
-        let components = match node.attribute("NumberOfComponents") {
-            None => 1,
-            Some(text) => match text.trim().parse::<usize>() {
-                Ok(0) | Ok(1) => 1,
-                Ok(n) => n,
-                Err(_) => {
-                    return Err(bad_attribute(node, "NumberOfComponents", text, "a whole number"));
-                }
-            },
-        };
+        let place = || At::Field(format!("array `{name}`"));
         let values = match node.attribute("format").unwrap_or("ascii") {
             "ascii" => {
                 let text = node.text().unwrap_or("");
@@ -193,6 +183,15 @@ impl<'a> XmlFile<'a> {
             return Err(Fault::new(place(), what, BROKEN));
         }
         Ok(Some(DataArray { name, components, values }))
+    }
+
+    /// How arrays are stored; `None` if that cannot be read.
+    pub(super) fn encoding(&self) -> Option<Encoding> {
+        self.encoding.clone().ok()
+    }
+
+    pub(super) fn appended_is_raw(&self) -> bool {
+        self.appended_is_raw
     }
 
     fn typed(
@@ -258,6 +257,23 @@ impl<'a> XmlFile<'a> {
         texts.pop_if(|t| t.is_empty());
         Ok(texts)
     }
+}
+
+/// The name of an array, its values per tuple and their type; `None` for a type that is not read.
+pub(super) fn array_description(
+    node: Node<'_, '_>,
+) -> Result<Option<(String, usize, ScalarType)>, Fault> {
+    let Some(kind) = scalar_type(node.attribute("type").unwrap_or("")) else { return Ok(None) };
+    let components = match node.attribute("NumberOfComponents") {
+        None => 1,
+        Some(text) => match text.trim().parse::<usize>() {
+            Ok(n) => n.max(1),
+            Err(_) => {
+                return Err(bad_attribute(node, "NumberOfComponents", text, "a whole number"));
+            }
+        },
+    };
+    Ok(Some((node.attribute("Name").unwrap_or("").to_string(), components, kind)))
 }
 
 /// The scalar type with the given name in XML files, including older names.

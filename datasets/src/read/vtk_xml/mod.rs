@@ -7,13 +7,17 @@
 //! File Formats" (Kitware), and what VTK 9.7 and ParaView 5.11 write.
 
 pub(crate) mod blocks;
+mod cell_pieces;
 mod file;
 mod levels;
+mod outline;
 mod parallel;
 mod piece_files;
 pub(crate) mod pieces;
 pub(crate) mod series;
+mod stored_array;
 
+pub use cell_pieces::{CellPiece, CellPieces};
 pub use piece_files::{PieceFiles, piece_files};
 
 use super::{Content, LoadedFile, OpenOptions, ReadError, TimeStep};

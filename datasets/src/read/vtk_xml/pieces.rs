@@ -145,20 +145,31 @@ fn point_and_cell_data(
                 arrays.push(array);
             }
         }
-        let marked =
-            |what: &str| section.attribute(what).filter(|n| !n.is_empty()).map(str::to_string);
         if of_points {
             out.point.extend(arrays);
+        } else {
+            out.cell.extend(arrays);
+        }
+        all_marks(section, out);
+    }
+    Ok(())
+}
+
+/// Which arrays a section marks as normals and the like.
+pub(super) fn all_marks(section: Node<'_, '_>, out: &mut Attributes) {
+    let marked = |what: &str| section.attribute(what).filter(|n| !n.is_empty()).map(str::to_string);
+    match section.tag_name().name() {
+        "PointData" => {
             out.point_normals = marked("Normals");
             out.point_texcoords = marked("TCoords");
             out.point_scalars = marked("Scalars");
-        } else {
-            out.cell.extend(arrays);
+        }
+        "CellData" => {
             out.cell_normals = marked("Normals");
             out.cell_scalars = marked("Scalars");
         }
+        _ => {}
     }
-    Ok(())
 }
 
 /// The array with the given name inside `section`.
