@@ -6,6 +6,7 @@
 //! are meaningless. The step checks that every experiment runs to its end.
 
 use crate::step::{Context, Outcome};
+use crate::test_programs::OTHERS;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -28,7 +29,8 @@ const PYTHONS: [(&str, &str); 3] = [
 pub(crate) fn run(context: &Context<'_>) -> Outcome {
     // A no-op after `build-tests`. When run alone, this step builds what it needs, with the
     // features of the tests.
-    let built = context.cargo(&["test", "--workspace", "--no-run", "--quiet"], &[]);
+    let args = [&["test", "--no-run", "--quiet"][..], &OTHERS].concat();
+    let built = context.cargo(&args, &[]);
     if built != Outcome::Passed {
         return built;
     }

@@ -2,6 +2,9 @@
 //!
 //! `cargo test` runs them one after another. Many wait for other programs or have one long test, so
 //! that two cores were busy for 60 % of the 1,280 s that this took.
+//!
+//! rt-core's unit tests are not among them: they are a second build of the whole member, eight
+//! minutes of a core. The step `counters` runs them, less optimised.
 
 use crate::main_job::build_folder;
 use crate::side_by_side;
@@ -11,10 +14,11 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
-/// What cargo builds. Not --examples: it would turn examples into test harnesses, and tests need
-/// the example that is a shared library.
-const ARGUMENTS: &[&str] =
-    &["test", "--workspace", "--no-run", "--lib", "--bins", "--tests", "--message-format=json"];
+/// The member whose unit tests another step runs.
+const WITHOUT_UNIT_TESTS: &str = "rt-core";
+/// All other members: cargo's selection of packages, for all steps that use the same build. With
+/// other selections packages have other features, and everything would be built again.
+pub(crate) const OTHERS: [&str; 3] = ["--workspace", "--exclude", WITHOUT_UNIT_TESTS];
 /// Number of the slowest programs that are named at the end.
 const SLOWEST: usize = 12;
 
@@ -35,16 +39,24 @@ struct Ended {
 
 /// Builds and runs all test programs.
 pub(crate) fn run(context: &Context<'_>) -> Outcome {
-    println!("cargo {}", ARGUMENTS.join(" "));
-    let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-    cargo.args(ARGUMENTS).current_dir(context.root).stderr(Stdio::inherit());
-    cargo.envs(context.peers.environment(context.options.require_peers));
-    let output = match cargo.output() {
-        Ok(output) if output.status.success() => output,
-        Ok(output) => return Outcome::Failed(format!("the tests do not build: {}", output.status)),
-        Err(e) => return Outcome::Failed(format!("cargo does not start: {e}")),
+    let own = match integration_tests(context.root) {
+        Ok(own) => own,
+        Err(why) => return Outcome::Failed(why),
     };
-    let mut programs = programs(&String::from_utf8_lossy(&output.stdout));
+    // Not --examples: it would turn examples into test harnesses, and tests need the example that
+    // is a shared library.
+    let kinds = ["--lib", "--bins", "--tests"];
+    let others: Vec<&str> = OTHERS.iter().chain(&kinds).copied().collect();
+    let mut programs = Vec::new();
+    for selection in [others, own_selection(&own)] {
+        match built(context, &selection) {
+            Ok(some) => programs.extend(some),
+            Err(why) => return Outcome::Failed(why),
+        }
+    }
+    // Where two members have a test of one name, both selections have both.
+    programs.sort_by(|a, b| (&a.folder, &a.file).cmp(&(&b.folder, &b.file)));
+    programs.dedup();
     if programs.is_empty() {
         return Outcome::Failed("cargo names no test program".to_owned());
     }
@@ -70,6 +82,59 @@ pub(crate) fn run(context: &Context<'_>) -> Outcome {
         0 => Outcome::Passed,
         n => Outcome::Failed(format!("{n} test programs: {}", failed.join(", "))),
     }
+}
+
+/// Builds all test programs, and the programs and the shared library that they run.
+pub(crate) fn build(context: &Context<'_>) -> Outcome {
+    let own = match integration_tests(context.root) {
+        Ok(own) => own,
+        Err(why) => return Outcome::Failed(why),
+    };
+    for selection in [OTHERS.to_vec(), own_selection(&own)] {
+        let args = [&["test", "--no-run"], &selection[..]].concat();
+        println!("cargo {}", args.join(" "));
+        let outcome = context.cargo(&args, &[]);
+        if outcome != Outcome::Passed {
+            return outcome;
+        }
+    }
+    Outcome::Passed
+}
+
+/// The names of rt-core's integration tests.
+fn integration_tests(root: &Path) -> Result<Vec<String>, String> {
+    let folder = root.join(WITHOUT_UNIT_TESTS).join("tests");
+    let entries = std::fs::read_dir(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+    let mut names: Vec<String> = entries
+        .flatten()
+        .map(|entry| entry.path())
+        .filter(|path| {
+            path.join("main.rs").is_file() || path.extension().is_some_and(|e| e == "rs")
+        })
+        .filter_map(|path| Some(path.file_stem()?.to_string_lossy().into_owned()))
+        .collect();
+    names.sort();
+    Ok(names)
+}
+
+/// cargo's selection of these tests: with all members, for the features of the other selection.
+fn own_selection(names: &[String]) -> Vec<&str> {
+    let each = names.iter().flat_map(|name| ["--test", name]);
+    ["--workspace"].into_iter().chain(each).collect()
+}
+
+/// Builds a selection, and returns its test programs.
+fn built(context: &Context<'_>, selection: &[&str]) -> Result<Vec<Program>, String> {
+    let args = [&["test", "--no-run", "--message-format=json"], selection].concat();
+    println!("cargo {}", args.join(" "));
+    let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    cargo.args(&args).current_dir(context.root).stderr(Stdio::inherit());
+    cargo.envs(context.peers.environment(context.options.require_peers));
+    let output = cargo.output().map_err(|e| format!("cargo does not start: {e}"))?;
+    if !output.status.success() {
+        return Err(format!("the tests do not build: {}", output.status));
+    }
+    Ok(programs(&String::from_utf8_lossy(&output.stdout)))
 }
 
 /// Where the loader looks for shared libraries: where cargo puts them, as for its own tests.
@@ -118,23 +183,21 @@ fn name(program: &Program) -> String {
     format!("{member} {of_test}")
 }
 
-/// The test programs that cargo's messages name, in the order of members and programs.
+/// The test programs that cargo's messages name.
 fn programs(messages: &str) -> Vec<Program> {
     // A program's own target also says `test`: that it could be tested.
     let is_test = |line: &&str| {
         let profile = line.split_once("\"profile\":{").and_then(|(_, p)| p.split_once('}'));
         profile.is_some_and(|(profile, _)| profile.contains("\"test\":true"))
     };
-    let mut programs: Vec<Program> = messages
+    messages
         .lines()
         .filter(is_test)
         .filter_map(|line| {
             let folder = Path::new(&text_of(line, "manifest_path")?).parent()?.to_owned();
             Some(Program { folder, file: text_of(line, "executable")?.into() })
         })
-        .collect();
-    programs.sort_by(|a, b| (&a.folder, &a.file).cmp(&(&b.folder, &b.file)));
-    programs
+        .collect()
 }
 
 /// The text of a key of a JSON object in a line, without its escapes but `\\` and `\"`; `None` if
@@ -173,9 +236,17 @@ mod tests {
         let messages = MESSAGES.join("\n").replace('\'', "\"");
         let found = programs(&messages);
         let of = |folder: &str, file: &str| Program { folder: folder.into(), file: file.into() };
-        assert_eq!(found, [of("/r/a", "/t/o\"k-01"), of("/r/b", "/t/far-02")]);
-        assert_eq!(name(&found[1]), "b far");
+        assert_eq!(found, [of("/r/b", "/t/far-02"), of("/r/a", "/t/o\"k-01")]);
+        assert_eq!(name(&found[0]), "b far");
         assert_eq!(text_of(&messages, "no such key"), None);
+    }
+
+    #[test]
+    fn rt_core_s_integration_tests_are_found_in_files_and_folders() {
+        let names = integration_tests(&crate::workspace_root()).unwrap();
+        let has = |name: &str| names.iter().any(|n| n == name);
+        assert!(has("hard_cases") && has("frames") && !has("scenes_common"), "{names:?}");
+        assert_eq!(own_selection(&names)[..2], ["--workspace", "--test"]);
     }
 
     #[test]

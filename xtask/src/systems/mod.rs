@@ -14,6 +14,7 @@ mod outcome;
 mod suites;
 
 use crate::step::{Context, Outcome};
+use crate::test_programs::OTHERS;
 use chroot::Chroot;
 use outcome::Tested;
 use std::path::{Path, PathBuf};
@@ -158,8 +159,8 @@ fn tested(
 
 /// Builds the test programs of `suite`.
 fn test_programs(root: &Path, suite: &Suite) -> Result<Programs, String> {
-    // All members, as `build-tests` does: with other features, everything would be built again.
-    let mut args = vec!["test", "--workspace", "--no-run"];
+    // As `build-tests` does: with other features, everything would be built again.
+    let mut args = [&["test", "--no-run"][..], &OTHERS].concat();
     for part in suite.parts {
         if !args.contains(&part.test) {
             args.extend(["--test", part.test]);

@@ -4,6 +4,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use crate::test_programs::OTHERS;
+
 use super::packages::{Builder, Package};
 use super::{WheelsOptions, one_build, run_it};
 
@@ -94,7 +96,7 @@ fn with_backend(package: &Package, places: &Places<'_>, profile: &str) -> Result
 /// would have other features of some packages, and rt-core would be compiled once more.
 pub(super) fn build_tests(root: &Path) -> Result<(), String> {
     let mut cargo = cargo();
-    run_it(cargo.args(["test", "--workspace", "--no-run", "--quiet"]).current_dir(root))
+    run_it(cargo.args(["test", "--no-run", "--quiet"]).args(OTHERS).current_dir(root))
 }
 
 /// Whether auditwheel finds that the wheel keeps to the policy in its name.

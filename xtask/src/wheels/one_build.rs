@@ -1,20 +1,23 @@
-//! What maturin calls as cargo in CI: it builds the whole workspace, and shows maturin one package.
+//! What maturin calls as cargo in CI: it builds what `build-tests` builds, and shows maturin one
+//! package.
 //!
 //! maturin calls `cargo rustc` for one package. The packages that it needs then have other features
 //! than in the step `build-tests`, where all members and their tests ask for some; so cargo
-//! compiled rt-core twice more, and datasets and schlieren once. Of the whole workspace with its
-//! tests, only what Python's interface needs is left to compile. `cargo xtask wheels`, which makes
+//! compiled rt-core twice more, and datasets and schlieren once. With all members and their tests,
+//! only what Python's interface needs is left to compile. `cargo xtask wheels`, which makes
 //! what is published, calls cargo itself.
 
 use std::ffi::{OsStr, OsString};
 use std::io::Write as _;
 use std::process::{Command, ExitCode, Stdio};
 
+use crate::test_programs::OTHERS;
+
 /// The variable that holds the real cargo, and makes this program stand in for it.
 pub(crate) const CARGO: &str = "XTASK_ONE_BUILD_CARGO";
 
-/// The selection of `build-tests`, and the libraries that have no tests: those of Python.
-const WORKSPACE: &[&str] = &["build", "--workspace", "--lib", "--bins", "--tests"];
+/// The targets of `build-tests`, and the libraries that have no tests: those of Python.
+const TARGETS: &[&str] = &["--lib", "--bins", "--tests"];
 
 /// Runs the command that maturin gives.
 pub(crate) fn run(cargo: &OsStr, args: impl Iterator<Item = OsString>) -> ExitCode {
@@ -25,7 +28,11 @@ pub(crate) fn run(cargo: &OsStr, args: impl Iterator<Item = OsString>) -> ExitCo
         let status = command.args(&args).status();
         return exit_code(status.ok().and_then(|s| s.code()));
     };
-    command.args(WORKSPACE).args(["--message-format", "json-render-diagnostics", "--locked"]);
+    command.arg("build").args(OTHERS).args(TARGETS).args([
+        "--message-format",
+        "json-render-diagnostics",
+        "--locked",
+    ]);
     let output = match command.stdin(Stdio::null()).stderr(Stdio::inherit()).output() {
         Ok(output) => output,
         Err(e) => {
