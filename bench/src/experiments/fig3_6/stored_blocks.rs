@@ -4,7 +4,7 @@
 
 use super::super::Context;
 use super::super::many_ranks::{frames_of, with_cost};
-use super::{HEADLIGHT, LIT, LOCAL, OCCLUSION_RAYS, secondary_rays_of};
+use super::{Lighting, OCCLUSION_RAYS};
 use crate::record::{Record, Row};
 use crate::stored_data::store_wavelet;
 use anyhow::Context as _;
@@ -58,14 +58,14 @@ fn camera(blocks: UVec3) -> anyhow::Result<Camera> {
 }
 
 /// The part of one rank.
-fn scene(path: &Path, rank: usize, blocks: UVec3, light: &str) -> anyhow::Result<RankScene> {
+fn scene(path: &Path, rank: usize, blocks: UVec3, light: Lighting) -> anyhow::Result<RankScene> {
     let mesh = stored_mesh::open(path, BUDGET)?;
     let mut scene = RankScene::new();
     let matte = scene.material(Material::matte([0.8; 3]));
     scene.shape(format!("block {rank:03}"), Arc::new(mesh), matte);
     scene.place(vec![DAffine3::from_translation(middle(rank, blocks))]);
     scene.background = Background::Constant([1.0; 4]);
-    if light == HEADLIGHT {
+    if light == Lighting::Headlight {
         scene.light(Light::headlight());
     } else {
         let lamp = 2.0 * SIDE * blocks.as_dvec3().length() * DVec3::new(-0.8, -0.9, 1.5);
@@ -101,10 +101,10 @@ pub(super) fn run(
     for ranks in ranks {
         let blocks = blocks(ranks);
         let camera = camera(blocks)?;
-        for light in [HEADLIGHT, LIT, LOCAL] {
-            context.report_step(format!("{ranks} ranks, {light}"))?;
+        for light in Lighting::ALL {
+            context.report_step(format!("{ranks} ranks, {}", light.name()))?;
             let options =
-                FrameOptions { secondary_rays: secondary_rays_of(light), ..Default::default() };
+                FrameOptions { secondary_rays: light.secondary_rays(), ..Default::default() };
             let measured = frames_of(ranks, count, &options, |comm, options| {
                 let scene = scene(&path, comm.rank(), blocks, light)
                     .with_context(|| format!("rank {}", comm.rank()))?;
@@ -114,7 +114,7 @@ pub(super) fn run(
             })?;
             record.rows.push(
                 with_cost(Row::new(), ranks, &measured)
-                    .with("light", light)
+                    .with("light", light.name())
                     .with("triangles", of_rank * ranks as u64)
                     .with("per_rank", of_rank),
             );
