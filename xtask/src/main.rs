@@ -1,10 +1,11 @@
 //! Set-up and checks of the workspace, as one small program without dependencies.
 //!
 //! The steps are a list in [`plan`]; [`runner`] runs them and prints their cost; [`tools`] checks
-//! the machine; [`test_programs`] runs the tests; [`peers`] finds and installs the third-party
-//! software that some tests compare with; [`licences`] checks what we link against; [`package`]
-//! checks what we publish; [`dist`] makes packages for machines without Rust; [`systems`] runs
-//! tests on other releases of Debian; [`wheels`] makes and tests the Python packages.
+//! the machine; [`test_programs`] runs the tests, of the packages in [`selection`]; [`peers`] finds
+//! and installs the third-party software that some tests compare with; [`licences`] checks what we
+//! link against; [`package`] checks what we publish; [`dist`] makes packages for machines without
+//! Rust; [`systems`] runs tests on other releases of Debian; [`wheels`] makes and tests the Python
+//! packages.
 
 mod command;
 mod dist;
@@ -14,6 +15,7 @@ mod package;
 mod peers;
 mod plan;
 mod runner;
+mod selection;
 mod side_by_side;
 mod step;
 mod systems;

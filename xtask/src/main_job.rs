@@ -5,8 +5,8 @@
 //! two cores. The dev profile optimises all members but keeps their checks, so the measured times
 //! are meaningless. The step checks that every experiment runs to its end.
 
+use crate::selection::OTHERS;
 use crate::step::{Context, Outcome};
-use crate::test_programs::OTHERS;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 

@@ -7,6 +7,7 @@
 //! minutes of a core. The step `counters` runs them, less optimised.
 
 use crate::main_job::build_folder;
+use crate::selection::{OTHERS, WITHOUT_UNIT_TESTS};
 use crate::side_by_side;
 use crate::step::{Context, Outcome};
 use std::io::Write as _;
@@ -14,11 +15,6 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
-/// The member whose unit tests another step runs.
-const WITHOUT_UNIT_TESTS: &str = "rt-core";
-/// All other members: cargo's selection of packages, for all steps that use the same build. With
-/// other selections packages have other features, and everything would be built again.
-pub(crate) const OTHERS: [&str; 3] = ["--workspace", "--exclude", WITHOUT_UNIT_TESTS];
 /// Number of the slowest programs that are named at the end.
 const SLOWEST: usize = 12;
 

@@ -13,8 +13,8 @@ mod chroot;
 mod outcome;
 mod suites;
 
+use crate::selection::OTHERS;
 use crate::step::{Context, Outcome};
-use crate::test_programs::OTHERS;
 use chroot::Chroot;
 use outcome::Tested;
 use std::path::{Path, PathBuf};

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::test_programs::OTHERS;
+use crate::selection::OTHERS;
 
 use super::packages::{Builder, Package};
 use super::{WheelsOptions, one_build, run_it};

@@ -11,7 +11,7 @@ use std::ffi::{OsStr, OsString};
 use std::io::Write as _;
 use std::process::{Command, ExitCode, Stdio};
 
-use crate::test_programs::OTHERS;
+use crate::selection::OTHERS;
 
 /// The variable that holds the real cargo, and makes this program stand in for it.
 pub(crate) const CARGO: &str = "XTASK_ONE_BUILD_CARGO";
