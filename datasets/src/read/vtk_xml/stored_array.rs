@@ -81,7 +81,7 @@ impl StoredArray {
                 let mut starts = vec![0u64];
                 for compressed in sizes {
                     let start = starts[starts.len() - 1];
-                    starts.push(start.checked_add(compressed).unwrap_or(u64::MAX));
+                    starts.push(start.saturating_add(compressed));
                 }
                 let compressed = starts[starts.len() - 1];
                 let full = count - u64::from(last > 0);
