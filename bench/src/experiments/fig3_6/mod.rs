@@ -62,8 +62,8 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         "{size} x {size} pixels. Every rank traces camera rays \
          where its part is; that the image is that of one node is for composite's tests, and not \
          looked at here. The dissertation plots average and maximum render time: what \
-         lies between them is waiting. `{global}`: a lamp with shadows and {OCCLUSION_RAYS} rays of \
-         ambient occlusion for each hit, whose rays go to the ranks whose parts they enter. \
+         lies between them is waiting. `{global}`: a lamp with shadows and {OCCLUSION_RAYS} rays \
+         of ambient occlusion for each hit, whose rays go to the ranks whose parts they enter. \
          `{local}`: they end where the own part does, so that shadows of other parts are missing."
     ));
     if context.thesis {
@@ -97,7 +97,8 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     let ratio = with_all.iter().zip(&with_own).map(|((_, right), (_, local))| right / local);
     if let Some(worst) = ratio.max_by(f64::total_cmp) {
         record.notes.push(format!(
-            "`{global}` takes at most {worst:.2} times as long as `{local}`, over all numbers of ranks."
+            "`{global}` takes at most {worst:.2} times as long as `{local}`, over all numbers of \
+             ranks."
         ));
     }
     Ok(())

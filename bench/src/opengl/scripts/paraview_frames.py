@@ -6,7 +6,8 @@ from vtkmodules.vtkIOImage import vtkPNMWriter
 from vtkmodules.vtkRenderingCore import vtkWindowToImageFilter
 
 file, size = sys.argv[1], int(sys.argv[2])
-at = [float(number) for word in sys.argv[3:] for number in word.removeprefix("camera=").split(",")]
+words = [word.removeprefix("camera=").split(",") for word in sys.argv[3:]]
+at = [float(number) for numbers in words for number in numbers]
 reader = XMLPolyDataReader(FileName=[file])
 view = CreateRenderView(ViewSize=[size, size])
 shown = Show(reader, view)

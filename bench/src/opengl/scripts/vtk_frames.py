@@ -4,7 +4,8 @@ import itertools, sys
 import vtk
 
 file, size = sys.argv[1], int(sys.argv[2])
-view = [float(number) for word in sys.argv[3:] for number in word.removeprefix("camera=").split(",")]
+words = [word.removeprefix("camera=").split(",") for word in sys.argv[3:]]
+view = [float(number) for numbers in words for number in numbers]
 reader = vtk.vtkXMLPolyDataReader()
 reader.SetFileName(file)
 mapper = vtk.vtkPolyDataMapper()
