@@ -179,12 +179,12 @@ impl StoredArray {
     }
 
     fn not_base64(&self) -> Fault {
-        let what = "a part of it is not base64, or has white space in it";
+        let what = "a part of it is missing, is not base64, or has white space in it";
         Fault::new(
             At::Field(format!("array `{}`", self.name)),
             what,
-            "write it again with raw appended data (in ParaView: Save Data, Data Mode Appended, \
-             Encode Appended Data off)",
+            "copy the file again; or write it with raw appended data (in ParaView: Save Data, Data \
+             Mode Appended, Encode Appended Data off)",
         )
     }
 }
