@@ -27,6 +27,8 @@ const TOOLS: &[&str] = &["maturin==1.16.0", "auditwheel==6.8.2"];
 /// Interpreters that are looked for, and those of pyenv. The first is Debian's.
 const PYTHONS: &[&str] =
     &["/usr/bin/python3", "python3.10", "python3.11", "python3.12", "python3.13", "python3.14"];
+/// A test of rt-core that `build-tests` has built.
+const WITH_FEATURES_OF_TESTS: &str = "hard_cases";
 /// That nothing but numpy is installed beside the package. What the import loads is tested in
 /// Python, and how long it takes is measured by bench's experiment `python`.
 const ALONE: &str = "
@@ -217,19 +219,27 @@ fn pip(venv: &Path, packages: &[&str]) -> Result<(), String> {
     run_it(pip.args(packages))
 }
 
-/// Builds the program that the tests compare with.
+/// Builds the program that the tests compare with. For the profile `dev` that is one that
+/// `build-tests` has built, except for an example.
 fn reference_program(
     reference: &Reference,
     root: &Path,
     build: &Path,
     profile: &str,
 ) -> Result<PathBuf, String> {
-    if profile == "dev" {
-        build_tests(root)?;
-    } else {
-        let mut cargo = cargo();
-        cargo.args(["build", "--workspace", "--profile", profile]).args(reference.target);
-        run_it(cargo.current_dir(root))?;
+    match (profile, reference.is_example()) {
+        ("dev", false) => build_tests(root)?,
+        // A test beside the example: cargo then asks for the features that tests need, and compiles
+        // the example alone. Without one it compiles rt-core once more.
+        ("dev", true) => {
+            let beside = ["build", "--workspace", "--test", WITH_FEATURES_OF_TESTS];
+            run_it(cargo().args(beside).args(reference.target).current_dir(root))?;
+        }
+        _ => {
+            let mut cargo = cargo();
+            cargo.args(["build", "--workspace", "--profile", profile]).args(reference.target);
+            run_it(cargo.current_dir(root))?;
+        }
     }
     // The profile `dev` builds in `debug`.
     let folder = build.join(if profile == "dev" { "debug" } else { profile });

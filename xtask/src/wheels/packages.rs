@@ -42,6 +42,13 @@ pub(super) struct Reference {
     pub(super) variable: &'static str,
 }
 
+impl Reference {
+    /// Whether it is an example of a member, not one of its programs.
+    pub(super) fn is_example(&self) -> bool {
+        self.target.first() == Some(&"--example")
+    }
+}
+
 pub(super) const PACKAGES: &[Package] = &[
     Package {
         name: "rt_core",
