@@ -38,6 +38,7 @@ pub mod stl;
 pub mod stl_pieces;
 mod tecplot;
 pub(crate) mod time_axis;
+mod used_points;
 mod value_files;
 pub(crate) mod volume;
 pub mod volume_planes;

@@ -7,10 +7,10 @@
 use super::error::{At, BROKEN, Cursor, Fault, TRUNCATED, io_error};
 use super::ply::{Element, Encoding, FORMAT, Property, faces, header, is_corners, rows};
 use super::ply_vertices::PlyVertices;
+use super::used_points::UsedPoints;
 use super::{Content, LoadedFile, ReadError};
 use crate::model::{Cells, Dataset, Endian, PolyData, Values};
 use glam::DVec3;
-use rayon::slice::ParallelSliceMut;
 use rt_core::mesh::TriMesh;
 use std::fs::File;
 use std::io::{BufReader, Read as _, Seek as _, SeekFrom};
@@ -176,25 +176,14 @@ impl PlyPieces {
 
     /// Gives a piece the vertices that its faces use. Returns how many numbers have none.
     fn take_vertices(&self, piece: &mut PolyData) -> Result<usize, ReadError> {
-        let exists = |&id: &u32| u64::from(id) < self.vertices.count();
+        let exists = |&id: &u32| Some(u64::from(id)).filter(|&id| id < self.vertices.count());
         let ids = piece.polys.connectivity();
-        let mut used: Vec<u32> = ids.iter().copied().filter(exists).collect();
-        used.par_sort_unstable();
-        used.dedup();
-        let mut missing = 0;
-        let place = |id: &u32| match used.binary_search(id) {
-            Ok(place) => place as u32,
-            Err(_) => {
-                missing += 1;
-                Cells::NO_POINT
-            }
-        };
-        let ids = ids.iter().map(place).collect();
+        let UsedPoints { numbers, places, missing } = UsedPoints::of(|| ids.iter().map(exists));
         let ends = piece.polys.ends().iter().map(|&end| end as i64);
-        piece.polys = Cells::from_ends(ends, ids)
+        piece.polys = Cells::from_ends(ends, places)
             .map_err(|b| Fault::field("element `face`", format!("face {} has no end", b.cell)))
             .map_err(|f| f.in_file(&self.path, FORMAT))?;
-        let read = self.vertices.gathered(&used)?;
+        let read = self.vertices.gathered(&numbers)?;
         piece.points = read.points;
         piece.attributes.point_normals = read.attributes.point_normals;
         piece.attributes.point_scalars = read.attributes.point_scalars;

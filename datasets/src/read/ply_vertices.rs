@@ -44,14 +44,12 @@ impl PlyVertices {
     }
 
     /// The vertices with the given numbers, which must exist and ascend.
-    pub(super) fn gathered(&self, numbers: &[u32]) -> Result<PolyData, ReadError> {
+    pub(super) fn gathered(&self, numbers: &[u64]) -> Result<PolyData, ReadError> {
         let mut all: Option<PolyData> = None;
-        let group = |number: u32| u64::from(number) / AT_ONCE;
-        for near in numbers.chunk_by(|&a, &b| group(a) == group(b)) {
-            let first = u64::from(near[0]);
-            let read = self.read(first..u64::from(near[near.len() - 1]) + 1)?;
-            let places: Vec<usize> =
-                near.iter().map(|&n| (u64::from(n) - first) as usize).collect();
+        for near in numbers.chunk_by(|a, b| a / AT_ONCE == b / AT_ONCE) {
+            let first = near[0];
+            let read = self.read(first..near[near.len() - 1] + 1)?;
+            let places: Vec<usize> = near.iter().map(|&n| (n - first) as usize).collect();
             let some = vertices_at(read, &places);
             match &mut all {
                 None => all = Some(some),

@@ -15,9 +15,9 @@ use crate::model::{
     SharedFaces, UnstructuredGrid,
 };
 use crate::read::error::{At, BROKEN, Fault, io_error, refuse_pointer};
+use crate::read::used_points::UsedPoints;
 use crate::read::{Content, LoadedFile, ReadError};
 use glam::DVec3;
-use rayon::slice::ParallelSliceMut;
 use roxmltree::Node;
 use rt_core::mesh::TriMesh;
 use std::fs::File;
@@ -438,19 +438,9 @@ impl Piece {
         let ids = self.connectivity.tuples_in(corner..last)?;
         let num_points = self.points.tuples();
         let exists = |id: i64| u64::try_from(id).ok().filter(|&id| id < num_points);
-        let mut points: Vec<u64> = integers(&ids).filter_map(exists).collect();
-        points.par_sort_unstable();
-        points.dedup();
-        let mut missing = 0;
-        let local = |id| match exists(id).and_then(|id| points.binary_search(&id).ok()) {
-            Some(place) => place as u32,
-            None => {
-                missing += 1;
-                Cells::NO_POINT
-            }
-        };
-        let ids: Vec<u32> = integers(&ids).map(local).collect();
-        let cells = Cells::from_ends(ends.into_iter(), ids)
+        let UsedPoints { numbers: points, places, missing } =
+            UsedPoints::of(|| integers(&ids).map(exists));
+        let cells = Cells::from_ends(ends.into_iter(), places)
             .map_err(|bad| Fault::field("offsets", format!("cell {} has no end", bad.cell)))?;
         let types = match &mut self.types {
             Some(types) => integers(&types.tuples_in(range.clone())?)
