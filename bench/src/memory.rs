@@ -7,13 +7,17 @@
 
 use peak_alloc::PeakAlloc;
 use serde::{Deserialize, Serialize};
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
 #[global_allocator]
 static HEAP: PeakAlloc = PeakAlloc;
 
 /// The highest peak since [`start`] that [`peak`] has reset.
 static HIGHEST: AtomicUsize = AtomicUsize::new(0);
+/// As [`HIGHEST`], by the kernel, which [`resident_during`] has reset.
+static HIGHEST_RESIDENT: AtomicU64 = AtomicU64::new(0);
+
+const STATUS: &str = "/proc/self/status";
 
 /// The most that this process held at a time, programs that it started apart.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -29,9 +33,14 @@ pub struct PeakMemory {
 pub fn start() {
     HIGHEST.store(0, Ordering::Relaxed);
     HEAP.reset_peak_usage();
-    // "5" sets the peak to what is resident now (proc(5)). Where that is forbidden, an earlier
-    // experiment of the same run may have needed more.
-    let _ = std::fs::write("/proc/self/clear_refs", "5");
+    HIGHEST_RESIDENT.store(0, Ordering::Relaxed);
+    // Where that is forbidden, an earlier experiment of the same run may have needed more.
+    let _ = reset_resident_peak();
+}
+
+/// Sets the kernel's peak to what is resident now (proc(5)).
+fn reset_resident_peak() -> std::io::Result<()> {
+    std::fs::write("/proc/self/clear_refs", "5")
 }
 
 /// The peak since [`start`].
@@ -40,15 +49,34 @@ pub fn since_start() -> PeakMemory {
     let allocated = HEAP.peak_usage().max(HIGHEST.load(Ordering::Relaxed));
     PeakMemory {
         allocated_mb: mb(allocated as f64),
-        resident_mb: resident_peak("/proc/self/status").map(|bytes| mb(bytes as f64)),
+        resident_mb: resident_peak(STATUS)
+            .map(|bytes| mb(bytes.max(HIGHEST_RESIDENT.load(Ordering::Relaxed)) as f64)),
     }
 }
 
 /// `VmHWM` of a process's status file, in bytes.
 pub fn resident_peak(status: &str) -> Option<u64> {
+    bytes_of(status, "VmHWM:")
+}
+
+/// A field of a process's status file, in bytes.
+fn bytes_of(status: &str, field: &str) -> Option<u64> {
     let status = std::fs::read_to_string(status).ok()?;
-    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
+    let line = status.lines().find_map(|l| l.strip_prefix(field))?;
     Some(line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()? * 1024)
+}
+
+/// Runs `work`. Returns its result, and the number of bytes by which the resident memory exceeded
+/// that before, at the height: that of C libraries included, without what was kept from before and
+/// is used again. `None` where the kernel does not tell.
+pub fn resident_during<T>(work: impl FnOnce() -> T) -> (T, Option<u64>) {
+    if let Some(peak) = resident_peak(STATUS) {
+        HIGHEST_RESIDENT.fetch_max(peak, Ordering::Relaxed);
+    }
+    let before = bytes_of(STATUS, "VmRSS:").filter(|_| reset_resident_peak().is_ok());
+    let value = work();
+    let peak = before.and_then(|before| Some(resident_peak(STATUS)?.saturating_sub(before)));
+    (value, peak)
 }
 
 /// Runs `work`. Returns its result, and the number of bytes by which the peak heap size exceeded
@@ -82,6 +110,14 @@ mod tests {
         assert!(found.allocated_mb > 256.0, "{found:?}");
         if cfg!(target_os = "linux") {
             assert!(found.resident_mb.is_some_and(|mb| mb > 256.0), "{found:?}");
+            // Nor does the kernel's peak forget what came before a part that is measured alone.
+            let (sum, held) = resident_during(|| {
+                vec![1u8; block].iter().step_by(4096).map(|&b| u64::from(b)).sum::<u64>()
+            });
+            assert_eq!(sum, block as u64 / 4096);
+            assert!(held.is_some_and(|b| b.abs_diff(block as u64) < 64 << 20), "{held:?}");
+            assert!(resident_during(|| ()).1.is_some_and(|b| b < 64 << 20));
+            assert!(since_start().resident_mb >= found.resident_mb, "{found:?}");
         }
     }
 }
