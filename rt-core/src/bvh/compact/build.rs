@@ -9,7 +9,7 @@ use super::CompactBvh;
 use super::cache::new_key;
 use super::cut::{Part, parts};
 use super::meshlet::{Encoder, one_to_a_leaf};
-use super::pieces::{PIECE, divide};
+use super::pieces::{PIECE, Pieces, divide};
 use crate::bvh::build::{PrimRef, Progress, Stopped, build_wide};
 use crate::bvh::layout::id_leaf::IdWriter;
 use crate::bvh::layout::local_frame::LocalFrame;
@@ -49,23 +49,22 @@ impl CompactBvh {
         progress: &Progress<'_>,
     ) -> Result<CompactBvh, Stopped> {
         let triangles = TriWriter::new(mesh, frame, 0);
-        let usable = |&i: &u32| progress.goes_on_at(i) && mesh.is_renderable(i as usize);
-        let mut ids = Vec::with_capacity(mesh.indices.len());
-        ids.extend((0..mesh.indices.len() as u32).filter(usable));
-        progress.check()?;
-        let skipped = mesh.indices.len() - ids.len();
-        let tree = CompactBvh::of_triangles(&triangles, ids, quality, progress)?;
+        let usable = |i: u32| progress.goes_on_at(i) && mesh.is_renderable(i as usize);
+        let count = mesh.indices.len();
+        let pieces = divide(&triangles, count, usable, PIECE, progress)?;
+        let skipped = count - pieces.ids.len();
+        let tree = CompactBvh::of_pieces(&triangles, pieces, quality, progress)?;
         Ok(CompactBvh { skipped, ..tree })
     }
 
-    /// The tree of the triangles `ids`, which can all be built.
-    pub(crate) fn of_triangles(
+    /// The tree of the triangles of some pieces.
+    pub(crate) fn of_pieces(
         triangles: &TriWriter<'_>,
-        mut ids: Vec<u32>,
+        pieces: Pieces,
         quality: BuildQuality,
         progress: &Progress<'_>,
     ) -> Result<CompactBvh, Stopped> {
-        let ends = divide(&mut ids, triangles, PIECE, progress)?;
+        let Pieces { ids, ends } = pieces;
 
         // ---- The meshlets, behind the place of the root.
         let mut notes = Vec::new();

@@ -33,7 +33,7 @@ use super::layout::wide::WideBvh;
 pub(crate) use cache::{MeshletCache, new_key, with_cache};
 pub(crate) use check::check_units;
 pub(crate) use expand::{Expanded, ExpandedLeaves};
-pub(crate) use pieces::divide;
+pub(crate) use pieces::{BYTES_WHILE_DIVIDED, Pieces, divide};
 pub(crate) use place::TrianglePlace;
 
 /// A tree whose leaves are meshlets.

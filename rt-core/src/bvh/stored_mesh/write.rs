@@ -4,7 +4,7 @@ use super::attributes::{self, MeshAttributes};
 use super::error::StoredMeshError;
 use super::format::{Attributes, ENTRY_BYTES, HEADER_BYTES, Header, PageEntry, UNIT_BYTES};
 use crate::bvh::build::UNWATCHED;
-use crate::bvh::compact::{CompactBvh, divide};
+use crate::bvh::compact::{BYTES_WHILE_DIVIDED, CompactBvh, Pieces, divide};
 use crate::bvh::layout::local_frame::LocalFrame;
 use crate::bvh::layout::triangles::TriWriter;
 use crate::bvh::options::BuildQuality;
@@ -17,8 +17,9 @@ use rayon::prelude::*;
 
 /// Most triangles of a page: about 57 kB.
 const PAGE_TRIANGLES: usize = 1 << 12;
-/// Bytes of memory for each triangle that waits: its corners, their numbers and its own.
-const WAITING_BYTES: usize = 52;
+/// Bytes of memory for each triangle that waits: its corners and their numbers, and what it takes
+/// when all are divided among pages.
+const WAITING_BYTES: usize = 48 + BYTES_WHILE_DIVIDED;
 /// Bytes for triangles that wait, unless the caller chooses others.
 const DEFAULT_MEMORY: usize = 1 << 30;
 /// Pages that are built before they are written.
@@ -145,7 +146,8 @@ impl<S: PageSink> StoredMeshWriter<S> {
         self.quality = quality;
     }
 
-    /// Bytes that small pieces may take while they wait for others; 1 GiB without it.
+    /// Bytes that small pieces may take while they wait for others, and while they are divided
+    /// among pages; 1 GiB without it.
     pub fn set_memory(&mut self, bytes: usize) {
         self.memory = bytes;
     }
@@ -275,11 +277,11 @@ impl<S: PageSink> StoredMeshWriter<S> {
         }
         let frame = LocalFrame { center: self.origin, scale: 1.0 };
         let triangles = TriWriter::new(mesh, &frame, 0);
-        let mut ids: Vec<u32> =
-            (0..count as u32).filter(|&i| mesh.is_renderable(i as usize)).collect();
-        self.skipped += (count - ids.len()) as u64;
+        let usable = |i: u32| mesh.is_renderable(i as usize);
         let watched = "nobody watches, so nobody stops it";
-        let ends = divide(&mut ids, &triangles, PAGE_TRIANGLES, &UNWATCHED).expect(watched);
+        let divided = divide(&triangles, count, usable, PAGE_TRIANGLES, &UNWATCHED);
+        let Pieces { ids, ends } = divided.expect(watched);
+        self.skipped += (count - ids.len()) as u64;
         let mut start = 0;
         let ranges: Vec<_> =
             ends.into_iter().map(|end| std::mem::replace(&mut start, end)..end).collect();
@@ -292,7 +294,8 @@ impl<S: PageSink> StoredMeshWriter<S> {
                 } else {
                     Vec::new()
                 };
-                let tree = CompactBvh::of_triangles(&triangles, ids, self.quality, &UNWATCHED);
+                let page = Pieces { ends: vec![ids.len()], ids };
+                let tree = CompactBvh::of_pieces(&triangles, page, self.quality, &UNWATCHED);
                 (tree.expect(watched), words)
             };
             let pages: Vec<(CompactBvh, Vec<u32>)> = ranges.par_iter().map(build).collect();
