@@ -9,7 +9,8 @@ fn mask(count: u32) -> u64 {
 /// The `count` bits from bit `at` on, at most 32. Needs one word after the one where they start.
 #[inline(always)]
 pub(crate) fn read(words: &[u32], at: usize, count: u32) -> u32 {
-    let pair: &[u32; 2] = words[at >> 5..].first_chunk().expect("a word after the last number");
+    let word = at >> 5;
+    let pair: &[u32; 2] = words[word..word + 2].try_into().expect("a slice of that length");
     let pair = u64::from(pair[0]) | u64::from(pair[1]) << 32;
     (pair >> (at & 31) & mask(count)) as u32
 }

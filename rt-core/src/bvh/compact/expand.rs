@@ -43,6 +43,21 @@ fn leaf_reference(leaf: usize) -> ChildRef {
     ChildRef::leaf(TRI_LEAF_UNITS * leaf, LEAF_SIZE)
 }
 
+/// Eight bytes from `at` on, whatever they belong to; zeros where there are fewer. A copy of a
+/// length that only the meshlet knows would be a call for each row of each node.
+#[inline(always)]
+fn eight_bytes(bytes: &[u8], at: usize) -> [u8; WIDTH] {
+    let rest = bytes.get(at..).unwrap_or(&[]);
+    match rest.first_chunk() {
+        Some(eight) => *eight,
+        None => {
+            let mut eight = [0; WIDTH];
+            eight[..rest.len()].copy_from_slice(rest);
+            eight
+        }
+    }
+}
+
 impl Expanded {
     pub(super) const EMPTY: Expanded = Expanded {
         nodes: [Unit::ZERO; NODES],
@@ -102,15 +117,13 @@ impl Expanded {
             }
             let planes: &[u8] = bytemuck::cast_slice(&words[at + 1..]);
             for (row, unit) in node[..CHILD_ROW].iter_mut().enumerate() {
-                let mut q = [0u8; WIDTH];
-                q[..count].copy_from_slice(&planes[row * count..][..count]);
+                let q = eight_bytes(planes, row * count);
                 let (origin, step) = (origin[row / 2], steps[row / 2]);
-                for (x, q) in unit.0.iter_mut().zip(q) {
-                    *x = plane(origin, step, q);
-                }
                 // Boxes of no child are empty: as in the ordinary tree.
                 let empty = if row % 2 == 0 { f32::INFINITY } else { f32::NEG_INFINITY };
-                unit.0[count..].fill(empty);
+                for (slot, (x, q)) in unit.0.iter_mut().zip(q).enumerate() {
+                    *x = if slot < count { plane(origin, step, q) } else { empty };
+                }
             }
             *node[CHILD_ROW].bits_mut() = children;
             at += 1 + (6 * count).div_ceil(4);
@@ -211,22 +224,31 @@ impl ExpandedLeaves {
         let units = &mut self.units[TRI_LEAF_UNITS * leaf..][..TRI_LEAF_UNITS];
         let floats: &mut [f32] = bytemuck::cast_slice_mut(units);
         let floats: &mut [f32; 8 * TRI_LEAF_UNITS] = floats.try_into().expect("a leaf's units");
-        for slot in 0..LEAF_SIZE {
-            // Unused slots repeat the last triangle, as in the ordinary tree.
-            let triangle = (first + slot as u32).min(last);
-            // The three numbers together: 24 bits at most.
-            let three = 3 * self.index_bits;
-            let vertices = bits::read(words, self.indices + (triangle * three) as usize, three);
+        let count = (last.saturating_sub(first) as usize + 1).min(LEAF_SIZE);
+        // Copies: what is written cannot change them, so they need not be read again.
+        let (coordinates, index_bits, mask) = (self.coordinates, self.index_bits, self.vertex_mask);
+        let (indices, ids, id_bits, first_id) =
+            (self.indices, self.ids, self.id_bits, self.first_id);
+        // The three numbers together: 24 bits at most.
+        let three = 3 * index_bits;
+        for slot in 0..count {
+            let triangle = first + slot as u32;
+            let vertices = bits::read(words, indices + (triangle * three) as usize, three);
             for corner in 0..3 {
-                let vertex = vertices >> (corner as u32 * self.index_bits) & self.vertex_mask;
+                let vertex = vertices >> (corner as u32 * index_bits) & mask;
                 for axis in 0..3 {
-                    floats[4 * (3 * corner + axis) + slot] =
-                        self.coordinates[axis].of(words, vertex);
+                    floats[4 * (3 * corner + axis) + slot] = coordinates[axis].of(words, vertex);
                 }
             }
-            let at = self.ids + (triangle * self.id_bits) as usize;
-            let id = self.first_id.wrapping_add(bits::read(words, at, self.id_bits));
+            let at = ids + (triangle * id_bits) as usize;
+            let id = first_id.wrapping_add(bits::read(words, at, id_bits));
             floats[36 + slot] = f32::from_bits(id);
+        }
+        // Unused slots repeat the last triangle, as in the ordinary tree.
+        for row in floats.chunks_exact_mut(LEAF_SIZE) {
+            for slot in count..LEAF_SIZE {
+                row[slot] = row[count - 1];
+            }
         }
         self.present |= 1 << leaf;
     }

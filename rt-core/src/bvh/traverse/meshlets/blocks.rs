@@ -160,6 +160,7 @@ impl<T: TriangleTest, Q: HitQuery> Block<'_, T, Q> {
         inner: L,
     ) -> (L, Option<TrianglePlace>) {
         let mut leaves = Meshlets::new(&mut *self.cache, self.key, ray, inner);
+        leaves.keeps_place = self.places.is_some();
         if start.is_leaf() {
             leaves.test(simd, self.tree.units, start, &mut inflate_t(t_max));
         } else {

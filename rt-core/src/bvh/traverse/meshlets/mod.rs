@@ -23,6 +23,8 @@ pub(crate) struct Meshlets<'a, L> {
     pub(crate) key: u64,
     pub(crate) ray: &'a RaySetup,
     pub(crate) inner: L,
+    /// Whether somebody will ask for `place`.
+    pub(crate) keeps_place: bool,
     /// The place of the closest triangle, where this search has found it.
     pub(crate) place: Option<TrianglePlace>,
 }
@@ -35,7 +37,7 @@ impl<'a, L> Meshlets<'a, L> {
         ray: &'a RaySetup,
         inner: L,
     ) -> Meshlets<'a, L> {
-        Meshlets { cache, key, ray, inner, place: None }
+        Meshlets { cache, key, ray, inner, keeps_place: false, place: None }
     }
 }
 
@@ -48,7 +50,8 @@ impl<S: Simd, L: LeafTest<S>> LeafTest<S> for Meshlets<'_, L> {
         let before = self.inner.closest();
         let over = visit(simd, expanded, words, self.ray, skip_t, &mut self.inner);
         let after = self.inner.closest();
-        if after != before
+        if self.keeps_place
+            && after != before
             && let Some(id) = after
         {
             self.place = Some(expanded.leaves.place_of(leaf.unit(), id));

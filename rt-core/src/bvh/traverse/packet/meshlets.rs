@@ -169,6 +169,7 @@ impl<T: TriangleTest, Q: HitQuery, O, B> Meshlets<'_, T, Q, O, B> {
             let best = ClosestTri { t, u, v, prim: packet.prim[g][lane], found };
             let inner = ClosestLeaf::<T>::continuing(ray, best);
             let mut leaves = meshlets::Meshlets::new(cache, key, ray, inner);
+            leaves.keeps_place = packet.keeps_places;
             traverse_from(simd, tree, ray, t, node, &mut leaves);
             let b = leaves.inner.best;
             if !b.found {
@@ -213,7 +214,7 @@ impl<S: Simd, T: TriangleTest, Q: HitQuery, O: PacketOrigin> PacketLeaf<S>
     ) -> u16 {
         let units = self.leaves.with(simd, self.words, leaf);
         let changed = self.triangles.leaf(packet, simd, units, leaf, reached, lanes);
-        if !Q::ANY && changed != 0 {
+        if !Q::ANY && changed != 0 && packet.keeps_places {
             let first = TrianglePlace::of_leaf(self.unit, leaf.unit() / TRI_LEAF_UNITS);
             packet.keep_places(changed, &leaf_triangle_ids(leaf_floats(units, leaf)), first);
         }

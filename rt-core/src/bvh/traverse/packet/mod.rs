@@ -54,8 +54,11 @@ pub(crate) struct Packet {
     pub(crate) u: [Row; GROUPS],
     pub(crate) v: [Row; GROUPS],
     pub(crate) prim: [[u32; LANES]; GROUPS],
-    /// Where the closest triangles lie, in compact trees; without a meaning in lanes without a hit.
+    /// Where the closest triangles lie, in compact trees and where `keeps_places` is set; without a
+    /// meaning in lanes without a hit.
     pub(crate) place: [[TrianglePlace; LANES]; GROUPS],
+    /// Whether somebody will ask for `place`.
+    keeps_places: bool,
     /// Lanes that still search for a hit.
     active: [u16; GROUPS],
     /// Lanes that have a hit.
@@ -108,6 +111,7 @@ impl Packet {
             v: [[0.0; LANES]; GROUPS],
             prim: [[0; LANES]; GROUPS],
             place: [[TrianglePlace::NONE; LANES]; GROUPS],
+            keeps_places: false,
             active: [0; GROUPS],
             hit: [0; GROUPS],
             rcp_bounds: [[[0.0; LANES]; 2]; 3],

@@ -52,7 +52,9 @@ impl Packet {
             return;
         }
         let groups = std::mem::replace(&mut self.groups, entered);
+        self.keeps_places = true;
         self.trace::<S, T, Q>(simd, tree);
+        self.keeps_places = false;
         self.groups = groups;
         for g in set_bits(entered) {
             if self.hit[g] != 0 {
