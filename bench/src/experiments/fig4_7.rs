@@ -169,7 +169,7 @@ impl BuildSeries<'_> {
                 c.peak_bytes.map_or(WHILE_BUILDING * c.bytes as f64, |b| b.max(c.bytes) as f64)
             });
             let most = bytes.fold(0.0, f64::max) / n as f64;
-            // A library may hold more than it reports: with 256 million triangles, which seemed to
+            // A library may hold more than it reports: above 100 million triangles, which seemed to
             // fit, the kernel ended the program.
             let bytes_per_triangle = (most + builder.copy).max(resident as f64 / n as f64);
             let secs = secs.map_or(0.0, |s| s.median);
