@@ -94,9 +94,13 @@ fn with_backend(package: &Package, places: &Places<'_>, profile: &str) -> Result
 
 /// Builds what `build-tests` does; nothing is left to do after that step. A single target of it
 /// would have other features of some packages, and rt-core would be compiled once more.
-pub(super) fn build_tests(root: &Path) -> Result<(), String> {
-    let mut cargo = cargo();
-    run_it(cargo.args(["test", "--no-run", "--quiet"]).args(OTHERS).current_dir(root))
+fn build_tests(root: &Path) -> Result<(), String> {
+    run_it(cargo().args(arguments_of_tests()).current_dir(root))
+}
+
+/// What cargo is asked for by [`build_tests`].
+pub(super) fn arguments_of_tests() -> Vec<&'static str> {
+    [&["test", "--no-run", "--quiet"][..], &OTHERS].concat()
 }
 
 /// Whether auditwheel finds that the wheel keeps to the policy in its name.

@@ -19,7 +19,7 @@ mod make;
 pub(crate) mod one_build;
 mod packages;
 
-use make::{Places, absolute, build_tests, cargo, make};
+use make::{Places, absolute, arguments_of_tests, cargo, make};
 use packages::{PACKAGES, Package, Reference};
 
 /// What makes wheels of native modules, and what checks them.
@@ -219,31 +219,30 @@ fn pip(venv: &Path, packages: &[&str]) -> Result<(), String> {
     run_it(pip.args(packages))
 }
 
-/// Builds the program that the tests compare with. For the profile `dev` that is one that
-/// `build-tests` has built, except for an example.
+/// Builds the program that the tests compare with.
 fn reference_program(
     reference: &Reference,
     root: &Path,
     build: &Path,
     profile: &str,
 ) -> Result<PathBuf, String> {
-    match (profile, reference.is_example()) {
-        ("dev", false) => build_tests(root)?,
-        // A test beside the example: cargo then asks for the features that tests need, and compiles
-        // the example alone. Without one it compiles rt-core once more.
-        ("dev", true) => {
-            let beside = ["build", "--workspace", "--test", WITH_FEATURES_OF_TESTS];
-            run_it(cargo().args(beside).args(reference.target).current_dir(root))?;
-        }
-        _ => {
-            let mut cargo = cargo();
-            cargo.args(["build", "--workspace", "--profile", profile]).args(reference.target);
-            run_it(cargo.current_dir(root))?;
-        }
-    }
+    run_it(cargo().args(arguments_of_reference(reference, profile)).current_dir(root))?;
     // The profile `dev` builds in `debug`.
     let folder = build.join(if profile == "dev" { "debug" } else { profile });
     absolute(&folder.join(reference.path))
+}
+
+/// What cargo is asked for to build the program. For the profile `dev` that is one that
+/// `build-tests` has built, except for an example.
+fn arguments_of_reference<'a>(reference: &Reference, profile: &'a str) -> Vec<&'a str> {
+    let build: &[&str] = match (profile, reference.is_example()) {
+        ("dev", false) => return arguments_of_tests(),
+        // A test beside the example: cargo then asks for the features that tests need, and compiles
+        // the example alone. Without one it compiles rt-core once more.
+        ("dev", true) => &["build", "--workspace", "--test", WITH_FEATURES_OF_TESTS],
+        _ => &["build", "--workspace", "--profile", profile],
+    };
+    [build, reference.target].concat()
 }
 
 /// What a command that has to succeed prints. Where it fails this is in the error.
@@ -278,6 +277,22 @@ mod tests {
         {
             assert_eq!(is_supported(version), supported, "{version}");
         }
+    }
+
+    #[test]
+    fn an_example_that_tests_compare_with_is_built_where_no_other_step_does() {
+        let references: Vec<Reference> = PACKAGES.iter().filter_map(|p| p.reference).collect();
+        assert!(references.iter().any(Reference::is_example));
+        for reference in &references {
+            for profile in ["dev", "release"] {
+                let arguments = arguments_of_reference(reference, profile);
+                let names_it = reference.target.iter().all(|word| arguments.contains(word));
+                let of_tests = profile == "dev" && !reference.is_example();
+                assert_eq!(names_it, !of_tests, "{profile}: {arguments:?}");
+            }
+        }
+        let test = format!("rt-core/tests/{WITH_FEATURES_OF_TESTS}/main.rs");
+        assert!(crate::workspace_root().join(test).is_file());
     }
 
     #[test]
