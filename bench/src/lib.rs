@@ -15,6 +15,7 @@
 
 pub mod baselines;
 mod book;
+pub mod checkpoint;
 pub mod cli;
 pub mod clock;
 pub mod control_group;

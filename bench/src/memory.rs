@@ -29,6 +29,19 @@ pub struct PeakMemory {
     pub resident_mb: Option<f64>,
 }
 
+impl PeakMemory {
+    /// The higher of both, each way of counting by itself.
+    pub fn max(self, other: PeakMemory) -> PeakMemory {
+        PeakMemory {
+            allocated_mb: self.allocated_mb.max(other.allocated_mb),
+            resident_mb: match (self.resident_mb, other.resident_mb) {
+                (Some(a), Some(b)) => Some(a.max(b)),
+                (a, b) => a.or(b),
+            },
+        }
+    }
+}
+
 /// Starts counting for [`since_start`].
 pub fn start() {
     HIGHEST.store(0, Ordering::Relaxed);

@@ -78,6 +78,11 @@ struct RunArgs {
     /// first; its files are kept in the cache (RTSV_CACHE) for the next run
     #[arg(long, conflicts_with = "quick")]
     thesis: bool,
+    /// Continues the last run of these experiments into the same folder, if it ended early: parts
+    /// that it measured are kept. Rejected if the commit, the sizes or the machine are others. For
+    /// fig3.6, table4.1, fig4.7, fig4.9, stored-files, memory-limit
+    #[arg(long)]
+    resume: bool,
     /// Also keep the records in bench/runs/DATE-MACHINE/. Rejected if the tree has uncommitted
     /// changes, the load of the machine is above 0.75 per core, or this is not a release build
     #[arg(long)]

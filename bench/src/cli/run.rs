@@ -3,6 +3,7 @@
 use super::mesh_file::read_mesh;
 use super::report::write_page;
 use super::{RunArgs, default_dir};
+use crate::checkpoint::Checkpoint;
 use crate::doubts::{Admission, Gate};
 use crate::experiments::{self, Context, Experiment, Outcome, WITH_THESIS_SIZES};
 use crate::machine::Machine;
@@ -25,6 +26,13 @@ pub(super) fn run(common: CommonArgs, args: &RunArgs) -> anyhow::Result<()> {
     {
         let (id, with) = (other.id, WITH_THESIS_SIZES.join(", "));
         let text = format!("--thesis is for {with}; `{id}` has one full size, omit --thesis");
+        return Err(UsageError(text).into());
+    }
+    if args.resume
+        && let Some(other) = chosen.iter().find(|e| !WITH_THESIS_SIZES.contains(&e.id))
+    {
+        let (id, with) = (other.id, WITH_THESIS_SIZES.join(", "));
+        let text = format!("--resume is for {with}; `{id}` takes minutes, omit --resume");
         return Err(UsageError(text).into());
     }
     if args.mesh.is_some() && (args.record || args.record_despite_doubts) {
@@ -52,6 +60,7 @@ pub(super) fn run(common: CommonArgs, args: &RunArgs) -> anyhow::Result<()> {
             }
             return Err(refusal(experiment.id, &why).into());
         }
+        context.checkpoint = Some(checkpoint(&dir, experiment, args)?);
         let Outcome { mut record, interrupted } = match experiments::run(experiment, &mut context) {
             Err(e) if e.is::<Interrupted>() && written => {
                 // Report the experiments that finished.
@@ -64,6 +73,9 @@ pub(super) fn run(common: CommonArgs, args: &RunArgs) -> anyhow::Result<()> {
             record.recorded_despite = why;
         }
         record.write(&dir)?;
+        if let Some(checkpoint) = context.checkpoint.take().filter(|_| !interrupted) {
+            checkpoint.remove();
+        }
         // An interrupted measurement is not kept among the permanent records.
         if let Some(kept) = kept.as_ref().filter(|_| !interrupted) {
             record.write_measurements(kept)?;
@@ -77,6 +89,13 @@ pub(super) fn run(common: CommonArgs, args: &RunArgs) -> anyhow::Result<()> {
     }
     drop(steps);
     finish(common, &dir)
+}
+
+/// Where the parts of an experiment are kept, with those of the last run if it is to be continued.
+fn checkpoint(dir: &Path, experiment: &Experiment, args: &RunArgs) -> anyhow::Result<Checkpoint> {
+    let (quick, thesis) = (args.quick, args.thesis);
+    let checkpoint = Checkpoint::new(dir, experiment.id, quick, thesis, Machine::describe());
+    if args.resume { checkpoint.with_earlier_parts() } else { Ok(checkpoint) }
 }
 
 /// A gate that waits between experiments until Ctrl-C is pressed.

@@ -26,8 +26,6 @@ use std::sync::Arc;
 struct Builder<'a> {
     name: String,
     build: Box<dyn Fn() -> anyhow::Result<BuildCost> + 'a>,
-    /// Bytes a triangle besides what its cost counts: a copy of the input.
-    copy: f64,
     /// Whether it is measured however long it takes.
     is_main: bool,
 }
@@ -46,6 +44,16 @@ const PATIENCE: f64 = 10.0;
 /// result: obvhs has a binary tree, and boxes of all triangles, besides the wide tree.
 const WHILE_BUILDING: f64 = 3.0;
 
+const BYTES: &str = "bytes_per_triangle";
+const PEAK: &str = "peak_bytes_per_triangle";
+const RESIDENT: &str = "resident_bytes_per_triangle";
+
+/// Bytes a triangle that a builder holds besides what its cost counts: Embree gets a copy of
+/// positions and indices.
+fn copied_by(builder: &str) -> f64 {
+    if builder.starts_with("Embree") { 18.0 } else { 0.0 }
+}
+
 pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
     record.column("triangles", "", "triangles of the wavelet surfaces");
     record.column("builder", "", "tracer and preset, or renderer of a frame");
@@ -55,11 +63,17 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column("time_high", "s", "slowest round");
     record.column("cpu", "s", "median CPU time of all threads");
     record.column("rate", "Mtriangle/s", "triangles by median time");
-    record.column("bytes_per_triangle", "B", "memory of the structure, without the input mesh");
+    record.column(BYTES, "B", "memory of the structure, without the input mesh");
     record.column(
-        "peak_bytes_per_triangle",
+        PEAK,
         "B",
         "the most held while building: what Embree reports, what the heap grew by for rt-core",
+    );
+    record.column(
+        RESIDENT,
+        "B",
+        "what the program's resident memory grew by while building, at most, by the kernel; memory \
+         that it kept from before and used again is not in it",
     );
     let installed = InstalledBaselines::find();
     record.missing.extend(installed.missing.iter().cloned());
@@ -85,28 +99,31 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         record.notes.push("The sizes of the dissertation (--thesis).".into());
     }
     if context.quick {
-        for points in [51, 101] {
-            let mesh = meshes::coarse_wavelet(points)?;
-            series.measure(context, record, &mesh, 3)?;
+        let meshes = [meshes::coarse_wavelet(51)?, meshes::coarse_wavelet(101)?];
+        for (mesh, rounds) in
+            meshes.into_iter().zip([3, 3]).chain([(context.wavelet(Size::M1)?, 2)])
+        {
+            let rows = record.rows.len();
+            series.measure(context, record, &mesh, rounds)?;
+            series.learn(&record.rows[rows..]);
         }
-        let mesh = context.wavelet(Size::M1)?;
-        series.measure(context, record, &mesh, 2)?;
     } else {
         for step in steps(context.thesis) {
-            let mesh = match step.mesh(context)? {
-                Ok(mesh) => mesh,
-                Err(why) => {
-                    record.missing.push(why);
-                    continue;
-                }
-            };
             // A round of the largest meshes takes ten minutes.
             let rounds = match step {
                 Step::Beyond(_) => 1,
                 Step::Named(Size::M64) => 3,
                 Step::Named(_) => VERDICT_ROUNDS,
             };
-            series.measure(context, record, &mesh, rounds)?;
+            let rows = record.rows.len();
+            context.part(record, &step.name(), |context, record| {
+                match step.mesh(context)? {
+                    Ok(mesh) => series.measure(context, record, &mesh, rounds)?,
+                    Err(why) => record.missing.push(why),
+                }
+                Ok(())
+            })?;
+            series.learn(&record.rows[rows..]);
         }
     }
     record.plots.push(plot(record));
@@ -163,18 +180,7 @@ impl BuildSeries<'_> {
             }
         }
         for ((builder, costs), resident) in builders.iter().zip(&costs).zip(resident) {
-            record.rows.push(row(&builder.name, mesh, costs));
-            let secs = Summary::of(&costs.iter().map(|c| c.wall_secs).collect::<Vec<_>>());
-            let bytes = costs.iter().map(|c| {
-                c.peak_bytes.map_or(WHILE_BUILDING * c.bytes as f64, |b| b.max(c.bytes) as f64)
-            });
-            let most = bytes.fold(0.0, f64::max) / n as f64;
-            // A library may hold more than it reports: above 100 million triangles, which seemed to
-            // fit, the kernel ended the program.
-            let bytes_per_triangle = (most + builder.copy).max(resident as f64 / n as f64);
-            let secs = secs.map_or(0.0, |s| s.median);
-            let before = Before { triangles: n, secs, bytes_per_triangle };
-            self.before.insert(builder.name.clone(), before);
+            record.rows.push(row(&builder.name, mesh, costs, resident));
         }
         if let Some(frames) = drawn {
             let row = Row::new()
@@ -183,6 +189,25 @@ impl BuildSeries<'_> {
             record.rows.push(frames.end(row, 1.0)?);
         }
         Ok(())
+    }
+
+    /// Takes from the rows of a mesh what its builders took.
+    fn learn(&mut self, rows: &[Row]) {
+        for row in rows {
+            let number = |column: &str| row.number(column);
+            let (Some(name), Some(triangles), Some(secs), Some(bytes)) =
+                (row.text("builder"), number("triangles"), number("time"), number(BYTES))
+            else {
+                // Frames of llvmpipe hold no structure.
+                continue;
+            };
+            let most = number(PEAK).map_or(WHILE_BUILDING * bytes, |peak| peak.max(bytes));
+            // A library may hold more than it reports: above 100 million triangles, which seemed to
+            // fit, the kernel ended the program.
+            let bytes_per_triangle = (most + copied_by(name)).max(number(RESIDENT).unwrap_or(0.0));
+            let before = Before { triangles: triangles as usize, secs, bytes_per_triangle };
+            self.before.insert(name.to_owned(), before);
+        }
     }
 
     /// Whether a builder has the memory and the time for a mesh of `n` triangles.
@@ -240,7 +265,6 @@ fn builders<'a>(mesh: &'a Arc<TriMesh>, installed: &'a InstalledBaselines) -> Ve
         list.push(Builder {
             name: format!("rt-core {}{compact}", quality.name()),
             build: Box::new(move || Ok(RtCoreTracer::build(mesh, &options)?.cost)),
-            copy: 0.0,
             is_main: quality != BuildQuality::Best,
         });
     }
@@ -252,8 +276,6 @@ fn builders<'a>(mesh: &'a Arc<TriMesh>, installed: &'a InstalledBaselines) -> Ve
             list.push(Builder {
                 name: format!("{} {}{in_words}", e.name(), quality.name()),
                 build: Box::new(move || Ok(EmbreeScene::build(e, mesh, &options)?.cost)),
-                // Positions and indices.
-                copy: 18.0,
                 is_main: quality != Quality::High,
             });
         }
@@ -262,14 +284,13 @@ fn builders<'a>(mesh: &'a Arc<TriMesh>, installed: &'a InstalledBaselines) -> Ve
         list.push(Builder {
             name: format!("obvhs {}", preset.name()),
             build: Box::new(move || Ok(Obvhs::build(mesh, preset)?.cost)),
-            copy: 0.0,
             is_main: false,
         });
     }
     list
 }
 
-fn row(name: &str, mesh: &TriMesh, costs: &[BuildCost]) -> Row {
+fn row(name: &str, mesh: &TriMesh, costs: &[BuildCost], resident: u64) -> Row {
     let n = mesh.num_triangles() as f64;
     let of = |f: &dyn Fn(&BuildCost) -> f64| Summary::of(&costs.iter().map(f).collect::<Vec<_>>());
     let row = Row::new().with("triangles", mesh.num_triangles()).with("builder", name);
@@ -284,8 +305,9 @@ fn row(name: &str, mesh: &TriMesh, costs: &[BuildCost]) -> Row {
         .with("time_high", wall.high)
         .with("cpu", cpu.median)
         .with("rate", n / wall.median / 1e6)
-        .with("bytes_per_triangle", cost.bytes as f64 / n)
-        .with("peak_bytes_per_triangle", cost.peak_bytes.map(|b| b as f64 / n))
+        .with(BYTES, cost.bytes as f64 / n)
+        .with(PEAK, costs.iter().filter_map(|c| c.peak_bytes).max().map(|b| b as f64 / n))
+        .with(RESIDENT, (resident > 0).then_some(resident as f64 / n))
 }
 
 fn plot(record: &Record) -> Plot {

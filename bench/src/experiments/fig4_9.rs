@@ -59,10 +59,13 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     let pixels = if context.quick { 512 } else { 1024 };
     let all = steps(context.thesis);
     for &step in if context.quick { &all[..3] } else { &all[..] } {
-        match step.mesh(context)? {
-            Ok(mesh) => measure(context, record, mesa.as_ref(), step, &mesh, pixels)?,
-            Err(why) => record.missing.push(why),
-        }
+        context.part(record, &step.name(), |context, record| {
+            match step.mesh(context)? {
+                Ok(mesh) => measure(context, record, mesa.as_ref(), step, &mesh, pixels)?,
+                Err(why) => record.missing.push(why),
+            }
+            Ok(())
+        })?;
     }
     record.notes.extend(describe_growth(record));
     record.plots.push(plot(record));

@@ -72,41 +72,45 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     }
     let group = group.ok();
     for view in catalogue::find("wavelet")?.views() {
-        let scene = Scene { file: &file, camera: camera(folder.path(), &view)?, pixels };
-        let mut frames = [Frames::default(), Frames::default()];
-        for round in 0..rounds {
-            context.report_step(format!("{}, round {} of {rounds}", view.name, round + 1))?;
-            for which in order(if group.is_some() { 2 } else { 1 }, round) {
-                let group = group.as_ref().filter(|_| which == 1);
-                frames[which].add(scene.draw(group)?);
+        context.part(record, &view.name, |context, record| {
+            let scene = Scene { file: &file, camera: camera(folder.path(), &view)?, pixels };
+            let mut frames = [Frames::default(), Frames::default()];
+            for round in 0..rounds {
+                context.report_step(format!("{}, round {} of {rounds}", view.name, round + 1))?;
+                for which in order(if group.is_some() { 2 } else { 1 }, round) {
+                    let group = group.as_ref().filter(|_| which == 1);
+                    frames[which].add(scene.draw(group)?);
+                }
             }
-        }
-        let [free, limited] = &frames;
-        let first = free.images.first().cloned().unwrap_or_default();
-        for (frames, name) in [(free, UNLIMITED), (limited, LIMITED)] {
-            let Some(time) = Summary::of(&frames.secs) else { continue };
-            let mut row = Row::new()
-                .with("triangles", triangles)
-                .with("file", bytes as f64 / 1e6)
-                .with("view", view.name.as_str())
-                .with("limit", name);
-            if name == LIMITED {
-                row = row.with("limit_bytes", limit as f64 / 1e6);
-                let peak = group.as_ref().and_then(ControlGroup::peak_bytes);
-                row = row.with("peak", peak.map(|bytes| bytes as f64 / 1e6));
+            let [free, limited] = &frames;
+            let first = free.images.first().cloned().unwrap_or_default();
+            for (frames, name) in [(free, UNLIMITED), (limited, LIMITED)] {
+                let Some(time) = Summary::of(&frames.secs) else { continue };
+                let mut row = Row::new()
+                    .with("triangles", triangles)
+                    .with("file", bytes as f64 / 1e6)
+                    .with("view", view.name.as_str())
+                    .with("limit", name);
+                if name == LIMITED {
+                    row = row.with("limit_bytes", limit as f64 / 1e6);
+                    let peak = group.as_ref().and_then(ControlGroup::peak_bytes);
+                    row = row.with("peak", peak.map(|bytes| bytes as f64 / 1e6));
+                }
+                let ms = 1e3 / f64::from(PASSES);
+                record.rows.push(
+                    row.with("time", time.median * ms)
+                        .with("time_low", time.low * ms)
+                        .with("time_high", time.high * ms)
+                        .with("reads", frames.reads)
+                        .with("differs", frames.images.iter().filter(|i| **i != first).count()),
+                );
             }
-            let ms = 1e3 / f64::from(PASSES);
-            record.rows.push(
-                row.with("time", time.median * ms)
-                    .with("time_low", time.low * ms)
-                    .with("time_high", time.high * ms)
-                    .with("reads", frames.reads)
-                    .with("differs", frames.images.iter().filter(|i| **i != first).count()),
-            );
-        }
-        let per_round: Vec<f64> = free.secs.iter().zip(&limited.secs).map(|(f, l)| f / l).collect();
-        let name = format!("{}: memory for {LIMITED}", view.name);
-        record.ratios.extend(Ratio::of_rounds(name, "without a limit", &per_round));
+            let per_round: Vec<f64> =
+                free.secs.iter().zip(&limited.secs).map(|(f, l)| f / l).collect();
+            let name = format!("{}: memory for {LIMITED}", view.name);
+            record.ratios.extend(Ratio::of_rounds(name, "without a limit", &per_round));
+            Ok(())
+        })?;
     }
     Ok(())
 }

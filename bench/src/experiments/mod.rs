@@ -53,6 +53,7 @@ mod table5_1;
 mod test_section;
 mod wavelet_series;
 
+use crate::checkpoint::{Checkpoint, Extent};
 use crate::machine::Machine;
 use crate::meshes::MeshScene;
 use crate::record::Record;
@@ -384,6 +385,8 @@ pub struct Context<'a> {
     pub cancel: Option<Arc<AtomicBool>>,
     /// The mesh to measure on instead of the built-in ones.
     pub mesh: Option<MeshScene>,
+    /// Where parts of the experiment are kept as they are measured; none are without it.
+    pub checkpoint: Option<Checkpoint>,
     wavelets: BTreeMap<Size, Arc<TriMesh>>,
 }
 
@@ -397,7 +400,15 @@ impl<'a> Context<'a> {
         cancel: Option<Arc<AtomicBool>>,
         progress: &'a mut Progress<'a>,
     ) -> Context<'a> {
-        Context { quick, thesis: false, progress, cancel, mesh: None, wavelets: BTreeMap::new() }
+        Context {
+            quick,
+            thesis: false,
+            progress,
+            cancel,
+            mesh: None,
+            checkpoint: None,
+            wavelets: BTreeMap::new(),
+        }
     }
 
     fn report_step(&mut self, what: impl AsRef<str>) -> anyhow::Result<()> {
@@ -407,6 +418,26 @@ impl<'a> Context<'a> {
     /// As [`Context::report_step`], with the completed fraction of the experiment.
     fn report_share(&mut self, what: impl AsRef<str>, done: f64) -> anyhow::Result<()> {
         (self.progress)(what.as_ref(), Some(done))
+    }
+
+    /// Measures a part of the experiment, and keeps what it adds to the record; or takes that from
+    /// an earlier run, where the checkpoint has a part of that name.
+    fn part(
+        &mut self,
+        record: &mut Record,
+        name: &str,
+        measure: impl FnOnce(&mut Self, &mut Record) -> anyhow::Result<()>,
+    ) -> anyhow::Result<()> {
+        if self.checkpoint.as_ref().is_some_and(|c| c.restore(name, record)) {
+            return Ok(());
+        }
+        let (before, start) = (Extent::of(record), Instant::now());
+        measure(self, record)?;
+        let secs = start.elapsed().as_secs_f64();
+        match &mut self.checkpoint {
+            Some(c) => c.keep(name, record, before, secs, memory::since_start()),
+            None => Ok(()),
+        }
     }
 
     /// The wavelet surfaces of a size. Those of up to 4 million triangles are cached for the next
@@ -444,28 +475,47 @@ pub fn run(experiment: &Experiment, context: &mut Context<'_>) -> anyhow::Result
     let machine = Machine::describe();
     let Experiment { id, chapter, title, run } = *experiment;
     let mut record = Record::new(id, title, chapter, context.quick, machine);
+    let earlier = context.checkpoint.as_ref();
+    let (earlier_secs, earlier_memory) = earlier.map_or((0.0, None), Checkpoint::cost);
+    record.notes.extend(earlier.and_then(Checkpoint::note));
     // Ctrl-C is not a failure of the experiment.
     let interrupted = match run(context, &mut record) {
         Ok(()) => false,
         Err(e) if e.is::<Interrupted>() && record.rows.is_empty() => return Err(e),
         Err(e) if e.is::<Interrupted>() => {
             record.missing.push(format!(
-                "everything after the first {} rows: the run was interrupted; `bench run {id}` \
-                 measures it all",
-                record.rows.len()
+                "everything after the first {} rows: the run was interrupted; {}",
+                record.rows.len(),
+                continuation(context, id)
             ));
             true
         }
         Err(e) => return Err(e.context(format!("experiment `{id}` failed"))),
     };
-    record.elapsed_secs = start.elapsed().as_secs_f64();
-    record.peak_memory = Some(memory::since_start());
+    record.elapsed_secs = earlier_secs + start.elapsed().as_secs_f64();
+    let memory = memory::since_start();
+    record.peak_memory = Some(earlier_memory.map_or(memory, |m| m.max(memory)));
     let unexplained = record.unexplained_columns();
     anyhow::ensure!(
         unexplained.is_empty(),
         "experiment `{id}` does not explain its columns {unexplained:?}"
     );
     Ok(Outcome { record, interrupted })
+}
+
+/// How to measure the rest of an experiment that was interrupted.
+fn continuation(context: &Context<'_>, id: &str) -> String {
+    let thesis = if context.thesis { " --thesis" } else { "" };
+    match &context.checkpoint {
+        Some(c) if !c.names().is_empty() => {
+            let (n, names) = (c.names().len(), c.names().join(", "));
+            let parts = if n == 1 { "part" } else { "parts" };
+            format!(
+                "`bench run {id}{thesis} --resume` measures the rest ({n} {parts} are kept: {names})"
+            )
+        }
+        _ => format!("`bench run {id}{thesis}` measures it all"),
+    }
 }
 
 /// The record of an experiment that could not run because another program is missing: without rows,
@@ -480,6 +530,53 @@ pub fn left_out(experiment: &Experiment, why: &str) -> Record {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::record::Row;
+
+    fn two_parts(context: &mut Context<'_>, record: &mut Record) -> anyhow::Result<()> {
+        record.column("part", "", "its number");
+        for n in 1..=2 {
+            context.part(record, &format!("part {n}"), |context, record| {
+                context.report_step(n.to_string())?;
+                record.rows.push(Row::new().with("part", n));
+                Ok(())
+            })?;
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn a_run_that_was_interrupted_is_continued_where_it_ended() {
+        let dir = tempfile::tempdir().unwrap();
+        let experiment = Experiment { id: "two", chapter: 4, title: "Two parts", run: two_parts };
+        let checkpoint = || Checkpoint::new(dir.path(), "two", false, true, Machine::describe());
+
+        let mut interrupt_second = |step: &str, _: Option<f64>| match step {
+            "2" => Err(Interrupted.into()),
+            _ => Ok(()),
+        };
+        let mut context = Context::new(false, None, &mut interrupt_second);
+        (context.thesis, context.checkpoint) = (true, Some(checkpoint()));
+        let Outcome { record, interrupted } = run(&experiment, &mut context).unwrap();
+        assert!(interrupted && record.rows.len() == 1);
+        let why = &record.missing[0];
+        assert!(why.contains("`bench run two --thesis --resume`"), "{why}");
+        assert!(why.ends_with("(1 part is kept: part 1)"), "{why}");
+
+        let mut steps = vec![];
+        let mut note_steps = |step: &str, _: Option<f64>| {
+            steps.push(step.to_owned());
+            Ok(())
+        };
+        let mut context = Context::new(false, None, &mut note_steps);
+        context.checkpoint = Some(checkpoint().with_earlier_parts().unwrap());
+        let outcome = run(&experiment, &mut context).unwrap();
+        drop(context);
+        let record = outcome.record;
+        let parts: Vec<_> = record.rows.iter().map(|row| row.number("part")).collect();
+        assert_eq!((parts, steps), (vec![Some(1.0), Some(2.0)], vec!["2".to_owned()]));
+        assert!(!outcome.interrupted && record.missing.is_empty());
+        assert!(record.notes[0].contains("ended early measured part 1."), "{:?}", record.notes);
+    }
 
     #[test]
     fn ids_are_unique_and_found_in_any_case() {

@@ -32,6 +32,14 @@ pub(super) fn steps(thesis: bool) -> Vec<Step> {
 }
 
 impl Step {
+    /// The size in words.
+    pub(super) fn name(self) -> String {
+        match self {
+            Step::Named(size) => format!("{} triangles", size.name()),
+            Step::Beyond(millions) => format!("{millions}M triangles"),
+        }
+    }
+
     /// About how many triangles it has.
     pub(super) fn triangles(self) -> usize {
         match self {

@@ -101,24 +101,27 @@ pub(super) fn run(
     for ranks in ranks {
         let blocks = blocks(ranks);
         let camera = camera(blocks)?;
-        for light in Lighting::ALL {
-            context.report_step(format!("{ranks} ranks, {}", light.name()))?;
-            let options =
-                FrameOptions { secondary_rays: light.secondary_rays(), ..Default::default() };
-            let measured = frames_of(ranks, count, &options, |comm, options| {
-                let scene = scene(&path, comm.rank(), blocks, light)
-                    .with_context(|| format!("rank {}", comm.rank()))?;
-                let mut renderer = DataParallel::distributed(comm, scene, options.clone())?;
-                let (camera, render) = (&camera, &render);
-                Ok(move |comm: &mut SimComm| Ok(renderer.frame(comm, camera, render)?))
-            })?;
-            record.rows.push(
-                with_cost(Row::new(), ranks, &measured)
-                    .with("light", light.name())
-                    .with("triangles", of_rank * ranks as u64)
-                    .with("per_rank", of_rank),
-            );
-        }
+        context.part(record, &format!("{ranks} ranks"), |context, record| {
+            for light in Lighting::ALL {
+                context.report_step(format!("{ranks} ranks, {}", light.name()))?;
+                let options =
+                    FrameOptions { secondary_rays: light.secondary_rays(), ..Default::default() };
+                let measured = frames_of(ranks, count, &options, |comm, options| {
+                    let scene = scene(&path, comm.rank(), blocks, light)
+                        .with_context(|| format!("rank {}", comm.rank()))?;
+                    let mut renderer = DataParallel::distributed(comm, scene, options.clone())?;
+                    let (camera, render) = (&camera, &render);
+                    Ok(move |comm: &mut SimComm| Ok(renderer.frame(comm, camera, render)?))
+                })?;
+                record.rows.push(
+                    with_cost(Row::new(), ranks, &measured)
+                        .with("light", light.name())
+                        .with("triangles", of_rank * ranks as u64)
+                        .with("per_rank", of_rank),
+                );
+            }
+            Ok(())
+        })?;
     }
     Ok(())
 }

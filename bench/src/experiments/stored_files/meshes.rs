@@ -33,7 +33,7 @@ pub(super) enum Stored {
 pub(super) const ALL: [Stored; 3] = [Stored::Wavelet, Stored::MixingLayer, Stored::Plasma];
 
 impl Stored {
-    fn name(self, sizes: &Sizes) -> String {
+    pub(super) fn name(self, sizes: &Sizes) -> String {
         match self {
             Stored::Wavelet => format!("wavelet, {} million triangles", sizes.wavelet),
             Stored::MixingLayer => {

@@ -79,9 +79,13 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
         record.notes.push("The sizes of the dissertation (--thesis).".into());
     }
     let folder = Folder::new(context, &sizes)?;
-    volume::measure(context, record, &folder, &sizes)?;
+    context.part(record, "volume", |context, record| {
+        volume::measure(context, record, &folder, &sizes)
+    })?;
     for mesh in meshes::ALL {
-        meshes::measure(context, record, &folder, &sizes, mesh)?;
+        context.part(record, &mesh.name(&sizes), |context, record| {
+            meshes::measure(context, record, &folder, &sizes, mesh)
+        })?;
     }
     Ok(())
 }

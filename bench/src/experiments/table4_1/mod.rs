@@ -100,14 +100,17 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     }
     let setup = ProgramSetup { tools: &tools, display: &display, dir: dir.path() };
     for i in 0..subjects::count(context) {
-        let Some(subject) = subjects::subject(context, record, i)? else { continue };
-        for &program in &programs {
-            for view in &subject.views {
-                if view.is_none() || program.takes_a_view() {
-                    measure(context, record, &setup, program, &subject, view.as_ref())?;
+        context.part(record, &subjects::name(context.thesis, i), |context, record| {
+            let Some(subject) = subjects::subject(context, record, i)? else { return Ok(()) };
+            for &program in &programs {
+                for view in &subject.views {
+                    if view.is_none() || program.takes_a_view() {
+                        measure(context, record, &setup, program, &subject, view.as_ref())?;
+                    }
                 }
             }
-        }
+            Ok(())
+        })?;
     }
     record.plots.push(plot(record));
     Ok(())

@@ -44,6 +44,17 @@ pub(super) fn count(context: &Context<'_>) -> usize {
 
 const SERIES: [Size; 3] = [Size::M1, Size::M4, Size::M16];
 
+/// The name of subject number `i`, with its size.
+pub(super) fn name(thesis: bool, i: usize) -> String {
+    match SERIES.get(i) {
+        Some(size) => format!("wavelet around, {}", size.name()),
+        None => {
+            let (name, sizes, _) = DATA_SETS[i - SERIES.len()];
+            format!("{name}, {}", sizes[usize::from(thesis)])
+        }
+    }
+}
+
 /// Subject number `i`; `None` where there is no room for it, which the record then says.
 pub(super) fn subject(
     context: &mut Context<'_>,
