@@ -508,11 +508,8 @@ fn continuation(context: &Context<'_>, id: &str) -> String {
     let thesis = if context.thesis { " --thesis" } else { "" };
     match &context.checkpoint {
         Some(c) if !c.names().is_empty() => {
-            let (n, names) = (c.names().len(), c.names().join(", "));
-            let parts = if n == 1 { "part" } else { "parts" };
-            format!(
-                "`bench run {id}{thesis} --resume` measures the rest ({n} {parts} are kept: {names})"
-            )
+            let names = c.names().join(", ");
+            format!("`bench run {id}{thesis} --resume` measures the rest (kept: {names})")
         }
         _ => format!("`bench run {id}{thesis}` measures it all"),
     }
@@ -560,7 +557,7 @@ mod tests {
         assert!(interrupted && record.rows.len() == 1);
         let why = &record.missing[0];
         assert!(why.contains("`bench run two --thesis --resume`"), "{why}");
-        assert!(why.ends_with("(1 part is kept: part 1)"), "{why}");
+        assert!(why.ends_with("(kept: part 1)"), "{why}");
 
         let mut steps = vec![];
         let mut note_steps = |step: &str, _: Option<f64>| {
