@@ -64,7 +64,8 @@ impl<'w> Search<'w> {
                 self.visit(units, local, scale2, |search, leaf| {
                     let (expanded, words) =
                         dispatch!(level, simd => cache.meshlet(simd, tree.meshlets(), units, leaf));
-                    let (nodes, leaves) = expanded.parts();
+                    let (nodes, leaves) =
+                        dispatch!(level, simd => expanded.with_all_nodes(simd, words));
                     search.visit(nodes, local, scale2, |search, leaf| {
                         let units = dispatch!(level, simd => leaves.with(simd, words, leaf));
                         search.test_leaf(units, leaf, entry, &render_from_local);

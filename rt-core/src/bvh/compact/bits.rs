@@ -15,6 +15,16 @@ pub(crate) fn read(words: &[u32], at: usize, count: u32) -> u32 {
     (pair >> (at & 31) & mask(count)) as u32
 }
 
+/// The 64 bits from bit `at` on. Needs two words after the one where they start.
+#[inline(always)]
+pub(super) fn read_64(words: &[u32], at: usize) -> u64 {
+    let (word, shift) = (at >> 5, at & 31);
+    let three: &[u32; 3] = words[word..word + 3].try_into().expect("a slice of that length");
+    let low = u64::from(three[0]) | u64::from(three[1]) << 32;
+    // By 64 less the shift, in two steps: it may be 64.
+    low >> shift | u64::from(three[2]) << 1 << (63 - shift)
+}
+
 /// Bits needed for numbers up to `largest`.
 pub(crate) fn width(largest: u32) -> u32 {
     32 - largest.leading_zeros()
@@ -55,6 +65,18 @@ impl<'w> Writer<'w> {
 mod tests {
     use super::*;
     use crate::test_shapes::Random;
+
+    #[test]
+    fn sixty_four_bits_are_read_from_any_place() {
+        let mut r = Random::new(3);
+        let words: Vec<u32> = (0..8).map(|_| r.bits() as u32).collect();
+        for at in 0..32 * 5 {
+            let expected = (0..64).fold(0, |bits, i| {
+                bits | u64::from(words[(at + i) / 32] >> ((at + i) % 32) & 1) << i
+            });
+            assert_eq!(read_64(&words, at), expected, "from bit {at}");
+        }
+    }
 
     #[test]
     fn numbers_of_every_width_come_back() {

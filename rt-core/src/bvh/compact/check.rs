@@ -3,7 +3,6 @@
 
 use super::bits;
 use super::boxes::EXPONENTS;
-use super::coordinates::{Axis, Coordinates};
 use super::cut::MAX_LEAVES;
 use super::meshlet::{HEADER_WORDS, Header, MAX_NODES, NODE, NONE};
 use crate::bvh::layout::wide::{CHILD_ROW, ChildRef, MAX_DEPTH, NODE_UNITS, Unit, WIDTH};
@@ -66,33 +65,30 @@ fn check_meshlet(words: &[u32]) -> Result<(), &'static str> {
     if !in_range {
         return Err("the header of a meshlet is out of range");
     }
-    let mut at = check_nodes(words, &header)?;
+    let at = check_nodes(words, &header)?;
 
-    // ---- Vertices and numbers, in bits. A number is read with the word after its first.
-    at *= 32;
-    let indices = at;
-    at += (header.triangles * (3 * header.index_bits + header.id_bits)) as usize;
-    let mut axes: Vec<(Axis, usize)> = Vec::with_capacity(3);
-    for axis in header.axes {
-        axes.push((axis, at));
-        (_, at) = Coordinates::at(&axis, header.vertices, at);
-    }
-    if at / 32 + 2 > words.len() {
+    // ---- Triangles and vertices: 64 bits are read at a time, from where one starts.
+    let sections = header.sections(at);
+    if sections.end / 32 + 3 > words.len() {
         return Err("the numbers of a meshlet end outside");
     }
-    for corner in 0..3 * header.triangles {
-        let at = indices + (corner * header.index_bits) as usize;
-        if bits::read(words, at, header.index_bits) >= header.vertices {
-            return Err("a triangle has a vertex that does not exist");
+    for triangle in 0..header.triangles {
+        let at = sections.triangles + (triangle * sections.triangle) as usize;
+        for corner in 0..3 {
+            let at = at + (corner * header.index_bits) as usize;
+            if bits::read(words, at, header.index_bits) >= header.vertices {
+                return Err("a triangle has a vertex that does not exist");
+            }
         }
     }
-    for (axis, at) in axes.iter().filter(|(axis, _)| axis.entries != 0) {
-        let numbers = at + axis.value_bits() as usize;
-        for vertex in 0..header.vertices {
-            let at = numbers + (vertex * axis.number_bits()) as usize;
-            if bits::read(words, at, axis.number_bits()) >= axis.entries {
+    for vertex in 0..header.vertices {
+        let mut at = sections.vertices + (vertex * sections.vertex) as usize;
+        for axis in &header.axes {
+            let number = bits::read(words, at, axis.number_bits());
+            if axis.entries != 0 && number >= axis.entries {
                 return Err("a vertex has a coordinate that does not exist");
             }
+            at += axis.number_bits() as usize;
         }
     }
     Ok(())

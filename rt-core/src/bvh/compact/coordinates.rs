@@ -60,60 +60,83 @@ impl Axis {
         self.entries * self.bits
     }
 
-    /// Appends the coordinates. `sorted` is what [`Axis::choose`] left there.
-    pub(super) fn write(&self, values: &[f32], sorted: &[u32], out: &mut Writer<'_>) {
-        if self.entries == 0 {
-            values.iter().for_each(|&x| out.push(ordered(x) - self.base, self.bits));
-            return;
+    /// Appends the values that are stored once. `sorted` is what [`Axis::choose`] left there.
+    pub(super) fn write_values(&self, sorted: &[u32], out: &mut Writer<'_>) {
+        if self.entries != 0 {
+            sorted.iter().for_each(|&k| out.push(k - self.base, self.bits));
         }
-        sorted.iter().for_each(|&k| out.push(k - self.base, self.bits));
-        for &x in values {
-            let number = sorted.partition_point(|&k| k < ordered(x));
-            out.push(number as u32, self.number_bits());
+    }
+
+    /// The number of a vertex with this coordinate.
+    pub(super) fn number(&self, x: f32, sorted: &[u32]) -> u32 {
+        match self.entries {
+            0 => ordered(x) - self.base,
+            _ => sorted.partition_point(|&k| k < ordered(x)) as u32,
         }
     }
 }
 
-/// One coordinate of a meshlet, ready to be read.
+/// One coordinate of a meshlet's vertices, ready to be read.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Coordinates {
     base: u32,
     bits: u32,
-    number_bits: u32,
-    /// Where the values start, in bits; where the vertices' numbers do.
+    entries: u32,
+    /// Where the vertices' numbers lie in the bits that are read of a vertex.
+    shift: u32,
+    mask: u32,
+    /// Where the values start that are stored once, in bits.
     values: usize,
-    numbers: usize,
-    each_once: bool,
 }
+
+/// Most values that are stored once: their number has eight bits.
+pub(super) const MAX_VALUES: usize = 256;
 
 impl Coordinates {
     pub(super) const EMPTY: Coordinates =
-        Coordinates { base: 0, bits: 0, number_bits: 0, values: 0, numbers: 0, each_once: false };
+        Coordinates { base: 0, bits: 0, entries: 0, shift: 0, mask: 0, values: 0 };
 
-    /// The coordinates that start at bit `at`, and where they end.
+    /// Coordinates whose values start at bit `values`, and whose numbers start at bit `shift` of
+    /// what is read of a vertex.
     #[inline(always)]
-    pub(super) fn at(axis: &Axis, vertices: u32, at: usize) -> (Coordinates, usize) {
-        let (number_bits, numbers) = (axis.number_bits(), at + axis.value_bits() as usize);
-        let coordinates = Coordinates {
-            base: axis.base,
-            bits: axis.bits,
-            number_bits,
-            values: at,
-            numbers,
-            each_once: axis.entries != 0,
-        };
-        (coordinates, numbers + (vertices * number_bits) as usize)
+    pub(super) fn new(axis: &Axis, values: usize, shift: u32) -> Coordinates {
+        let &Axis { base, bits, entries } = axis;
+        let mask = ((1u64 << axis.number_bits()) - 1) as u32;
+        // Of 64 bits, none is left: the mask is 0 then.
+        Coordinates { base, bits, entries, shift: shift & 63, mask, values }
     }
 
-    /// The coordinate of a vertex.
+    /// Reads the values that are stored once.
     #[inline(always)]
-    pub(super) fn of(&self, words: &[u32], vertex: u32) -> f32 {
-        let at = self.numbers + (vertex * self.number_bits) as usize;
-        let mut number = bits::read(words, at, self.number_bits);
-        if self.each_once {
-            number = bits::read(words, self.values + (number * self.bits) as usize, self.bits);
+    pub(super) fn read_values(&self, words: &[u32], values: &mut [f32; MAX_VALUES]) {
+        let mut at = self.values;
+        for value in values.iter_mut().take(self.entries as usize) {
+            *value = float(self.base.wrapping_add(bits::read(words, at, self.bits)));
+            at += self.bits as usize;
         }
-        float(self.base.wrapping_add(number))
+    }
+
+    /// The coordinates of vertices of which these bits were read, by the values that are stored
+    /// once.
+    #[inline(always)]
+    pub(super) fn of<const N: usize>(
+        &self,
+        vertices: &[u64; N],
+        values: &[f32; MAX_VALUES],
+    ) -> [f32; N] {
+        let mut all = [0.0; N];
+        let (base, shift, mask) = (self.base, self.shift, self.mask);
+        // No `map`: its closure would be compiled without the caller's instruction set.
+        if self.entries != 0 {
+            for (x, vertex) in all.iter_mut().zip(vertices) {
+                *x = values[((vertex >> shift) as u32 & mask) as usize % MAX_VALUES];
+            }
+        } else {
+            for (x, vertex) in all.iter_mut().zip(vertices) {
+                *x = float(base.wrapping_add((vertex >> shift) as u32 & mask));
+            }
+        }
+        all
     }
 }
 
@@ -141,13 +164,20 @@ mod tests {
             once += usize::from(axis.entries > 0);
             let mut out = Writer::new(&mut words);
             out.push(5, 3);
-            axis.write(&values, &sorted, &mut out);
+            axis.write_values(&sorted, &mut out);
+            values.iter().for_each(|&x| out.push(axis.number(x, &sorted), axis.number_bits()));
             out.finish();
-            let (coordinates, end) = Coordinates::at(&axis, values.len() as u32, 3);
-            assert!(end <= 32 * words.len(), "{end} of {}", words.len());
-            for (i, x) in values.iter().enumerate() {
-                let back = coordinates.of(&words, i as u32);
-                assert_eq!(back.to_bits(), x.to_bits(), "{x} of {values:?}");
+            words.push(0);
+            let numbers = 3 + axis.value_bits() as usize;
+            for shift in [0, 7, 32] {
+                let coordinates = Coordinates::new(&axis, 3, shift);
+                let mut once = [0.0; MAX_VALUES];
+                coordinates.read_values(&words, &mut once);
+                for (i, x) in values.iter().enumerate() {
+                    let at = numbers + i * axis.number_bits() as usize;
+                    let [back] = coordinates.of(&[bits::read_64(&words, at) << shift], &once);
+                    assert_eq!(back.to_bits(), x.to_bits(), "{x} of {values:?}");
+                }
             }
         }
         assert!((1..6).contains(&once), "{once} sets with each value once");

@@ -1,46 +1,82 @@
-//! A meshlet in the layout of the ordinary tree: the small tree at once, each leaf when a ray first
-//! reaches it.
+//! A meshlet in the layout of the ordinary tree: each node and each leaf when a ray first reaches
+//! it. Most rays of ambient occlusion see two nodes of a far meshlet, and none of the rest.
 
-use super::bits;
 use super::boxes::plane;
-use super::coordinates::Coordinates;
 use super::cut::MAX_LEAVES;
-use super::meshlet::{HEADER_WORDS, Header, MAX_NODES, NODE, NONE};
-use super::place::TrianglePlace;
-use crate::bvh::layout::triangles::{TRI_LEAF_UNITS, leaf_floats, leaf_triangle_ids};
-use crate::bvh::layout::wide::{CHILD_ROW, ChildRef, LEAF_SIZE, NODE_UNITS, Unit, WIDTH};
+use super::expand_leaf::ExpandedLeaves;
+use super::meshlet::{HEADER_WORDS, Header, MAX_NODES};
+use crate::bvh::layout::triangles::TRI_LEAF_UNITS;
+use crate::bvh::layout::wide::{CHILD_ROW, ChildRef, NODE_UNITS, Unit, WIDTH};
 use fearless_simd::Simd;
 use glam::Vec3;
 
 const NODES: usize = NODE_UNITS * MAX_NODES;
-const LEAVES: usize = TRI_LEAF_UNITS * MAX_LEAVES;
 
 /// An expanded meshlet. References in its nodes lead to its own nodes and leaves.
 pub(crate) struct Expanded {
-    pub(crate) nodes: [Unit; NODES],
+    nodes: ExpandedNodes,
     pub(crate) leaves: ExpandedLeaves,
 }
 
-/// The leaves of an expanded meshlet, some of them not yet expanded.
-pub(crate) struct ExpandedLeaves {
-    units: [Unit; LEAVES],
-    /// The leaves that are in `units`.
+/// The nodes of an expanded meshlet, some of them not yet expanded.
+pub(crate) struct ExpandedNodes {
+    units: [Unit; NODES],
+    /// The nodes that are in `units`.
     present: u32,
-    /// First triangle and last triangle of each leaf.
-    triangles: [[u8; 2]; MAX_LEAVES],
-    index_bits: u32,
-    vertex_mask: u32,
-    id_bits: u32,
-    first_id: u32,
-    /// Where vertex numbers and triangle numbers start, in bits.
-    indices: usize,
-    ids: usize,
-    coordinates: [Coordinates; 3],
+    starts: [NodeStart; MAX_NODES],
+    count: usize,
+    origin: [f32; 3],
+    steps: [f32; 3],
 }
 
-/// A reference to a leaf of an expanded meshlet.
-fn leaf_reference(leaf: usize) -> ChildRef {
-    ChildRef::leaf(TRI_LEAF_UNITS * leaf, LEAF_SIZE)
+/// Where a node starts, and the first of what it names.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct NodeStart {
+    word: u16,
+    node: u8,
+    leaf: u8,
+    triangle: u8,
+}
+
+/// The children of a node: for each, the lowest of the four bits that have its kind.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Children {
+    count: u32,
+    nodes: u32,
+    leaves: u32,
+}
+
+impl Children {
+    /// The children of these kinds, up to the first that is none.
+    #[inline(always)]
+    fn of(kinds: u32) -> Children {
+        const EACH: u32 = 0x1111_1111;
+        let none = kinds & kinds >> 1 & kinds >> 2 & kinds >> 3 & EACH;
+        let count = none.trailing_zeros() / 4;
+        let there = EACH & ((1u64 << (4 * count)) - 1) as u32;
+        let nodes = kinds >> 3 & there;
+        Children { count, nodes, leaves: there & !nodes }
+    }
+}
+
+impl NodeStart {
+    const ZERO: NodeStart = NodeStart { word: 0, node: 0, leaf: 0, triangle: 0 };
+
+    /// Where the next node starts.
+    #[inline(always)]
+    fn next(self, kinds: u32) -> NodeStart {
+        let Children { count, nodes, leaves } = Children::of(kinds);
+        // Of a leaf, the lowest two bits have its triangles less one.
+        let triangles = leaves.count_ones()
+            + (kinds & leaves).count_ones()
+            + 2 * (kinds >> 1 & leaves).count_ones();
+        NodeStart {
+            word: self.word + 1 + (6 * count).div_ceil(4) as u16,
+            node: self.node.wrapping_add(nodes.count_ones() as u8),
+            leaf: self.leaf.wrapping_add(leaves.count_ones() as u8),
+            triangle: self.triangle.wrapping_add(triangles as u8),
+        }
+    }
 }
 
 /// Eight bytes from `at` on, whatever they belong to; zeros where there are fewer. A copy of a
@@ -59,23 +95,10 @@ fn eight_bytes(bytes: &[u8], at: usize) -> [u8; WIDTH] {
 }
 
 impl Expanded {
-    pub(super) const EMPTY: Expanded = Expanded {
-        nodes: [Unit::ZERO; NODES],
-        leaves: ExpandedLeaves {
-            units: [Unit::ZERO; LEAVES],
-            present: 0,
-            triangles: [[0; 2]; MAX_LEAVES],
-            index_bits: 0,
-            vertex_mask: 0,
-            id_bits: 0,
-            first_id: 0,
-            indices: 0,
-            ids: 0,
-            coordinates: [Coordinates::EMPTY; 3],
-        },
-    };
+    pub(super) const EMPTY: Expanded =
+        Expanded { nodes: ExpandedNodes::EMPTY, leaves: ExpandedLeaves::EMPTY };
 
-    /// Expands the small tree of the meshlet at the start of `words`.
+    /// Takes the meshlet at the start of `words`, nothing of which is expanded yet.
     #[inline(never)]
     pub(super) fn load<S: Simd>(&mut self, simd: S, words: &[u32]) {
         simd.vectorize(
@@ -87,95 +110,39 @@ impl Expanded {
     #[inline(always)]
     fn load_body(&mut self, words: &[u32]) {
         let header = Header::read(words);
-        let leaves = &mut self.leaves;
-        leaves.present = 0;
-
-        // ---- The nodes.
-        let (origin, steps) = (header.lattice.origin, header.lattice.steps());
-        let (mut at, mut next_node, mut next_leaf, mut triangle) = (HEADER_WORDS, 1, 0, 0u32);
-        for node in self.nodes.chunks_exact_mut(NODE_UNITS).take(header.nodes as usize) {
-            let kinds = words[at];
-            let mut children = [ChildRef::NONE.0; WIDTH];
-            let mut count = 0;
-            for (slot, child) in children.iter_mut().enumerate() {
-                let kind = kinds >> (4 * slot) & 15;
-                if kind == NONE {
-                    break;
-                }
-                count = slot + 1;
-                if kind == NODE {
-                    *child = ChildRef::node(NODE_UNITS * (next_node % MAX_NODES)).0;
-                    next_node += 1;
-                } else {
-                    let leaf = next_leaf % MAX_LEAVES;
-                    next_leaf += 1;
-                    let last = triangle + (kind & 3);
-                    *child = ChildRef::leaf(TRI_LEAF_UNITS * leaf, (kind & 3) as usize + 1).0;
-                    leaves.triangles[leaf] = [triangle as u8, last as u8];
-                    triangle = last + 1;
-                }
-            }
-            let planes: &[u8] = bytemuck::cast_slice(&words[at + 1..]);
-            for (row, unit) in node[..CHILD_ROW].iter_mut().enumerate() {
-                let q = eight_bytes(planes, row * count);
-                let (origin, step) = (origin[row / 2], steps[row / 2]);
-                // Boxes of no child are empty: as in the ordinary tree.
-                let empty = if row % 2 == 0 { f32::INFINITY } else { f32::NEG_INFINITY };
-                for (slot, (x, q)) in unit.0.iter_mut().zip(q).enumerate() {
-                    *x = if slot < count { plane(origin, step, q) } else { empty };
-                }
-            }
-            *node[CHILD_ROW].bits_mut() = children;
-            at += 1 + (6 * count).div_ceil(4);
+        let nodes = &mut self.nodes;
+        nodes.present = 0;
+        nodes.count = (header.nodes as usize).min(MAX_NODES);
+        (nodes.origin, nodes.steps) = (header.lattice.origin, header.lattice.steps());
+        let mut start = NodeStart { word: HEADER_WORDS as u16, node: 1, leaf: 0, triangle: 0 };
+        for place in nodes.starts.iter_mut().take(nodes.count) {
+            *place = start;
+            start = start.next(words[usize::from(start.word)]);
         }
-
-        // ---- What leaves are read from.
-        let triangles = header.triangles as usize;
-        leaves.index_bits = header.index_bits;
-        leaves.vertex_mask = (1 << header.index_bits) - 1;
-        leaves.id_bits = header.id_bits;
-        leaves.first_id = header.first_id;
-        leaves.indices = 32 * at;
-        leaves.ids = leaves.indices + 3 * triangles * header.index_bits as usize;
-        let mut at = leaves.ids + triangles * header.id_bits as usize;
-        for (coordinates, axis) in leaves.coordinates.iter_mut().zip(&header.axes) {
-            (*coordinates, at) = Coordinates::at(axis, header.vertices, at);
-        }
+        self.leaves.load(&header, usize::from(start.word));
     }
 
-    /// The units of the nodes, the units of the leaves.
+    /// The nodes, the leaves.
     #[inline(always)]
-    pub(crate) fn parts(&mut self) -> (&[Unit; NODES], &mut ExpandedLeaves) {
-        (&self.nodes, &mut self.leaves)
+    pub(crate) fn parts(&mut self) -> (&mut ExpandedNodes, &mut ExpandedLeaves) {
+        (&mut self.nodes, &mut self.leaves)
     }
-}
 
-impl ExpandedLeaves {
-    /// The units that hold `leaf`, which is expanded first where it is not. `words` start with the
-    /// meshlet.
+    /// The units of all nodes, and the leaves. `words` start with the meshlet.
     #[inline(always)]
-    pub(crate) fn with<S: Simd>(&mut self, simd: S, words: &[u32], leaf: ChildRef) -> &[Unit] {
-        let number = leaf.unit() / TRI_LEAF_UNITS;
-        if self.present >> number & 1 == 0 {
-            self.expand(simd, words, number);
+    pub(crate) fn with_all_nodes<S: Simd>(
+        &mut self,
+        simd: S,
+        words: &[u32],
+    ) -> (&[Unit; NODES], &mut ExpandedLeaves) {
+        for number in 0..self.nodes.count {
+            self.nodes.with(simd, words, NODE_UNITS * number, &mut self.leaves);
         }
-        &self.units
-    }
-
-    /// The place of triangle `id` of the meshlet at `unit`, among the leaves that are expanded.
-    #[inline(never)]
-    pub(crate) fn place_of(&self, unit: usize, id: u32) -> TrianglePlace {
-        for leaf in (0..MAX_LEAVES).filter(|leaf| self.present >> leaf & 1 == 1) {
-            let ids = leaf_triangle_ids(leaf_floats(&self.units, leaf_reference(leaf)));
-            if let Some(slot) = ids.iter().position(|&i| i == id) {
-                return TrianglePlace::of_leaf(unit, leaf).in_slot(slot);
-            }
-        }
-        TrianglePlace::NONE
+        (&self.nodes.units, &mut self.leaves)
     }
 
     /// The number and the corners of the triangle in a slot of a leaf. `None` when there is no such
-    /// leaf.
+    /// leaf. `words` start with the meshlet.
     #[inline(always)]
     pub(crate) fn triangle<S: Simd>(
         &mut self,
@@ -184,72 +151,134 @@ impl ExpandedLeaves {
         leaf: usize,
         slot: usize,
     ) -> Option<(u32, [Vec3; 3])> {
-        if leaf >= MAX_LEAVES || slot >= LEAF_SIZE {
-            return None;
+        if !self.leaves.has(leaf) {
+            // The node that names it says which triangles it has.
+            self.with_all_nodes(simd, words);
         }
-        let reference = leaf_reference(leaf);
-        let floats = leaf_floats(self.with(simd, words, reference), reference);
-        let at = |corner: usize, axis: usize| floats[4 * (3 * corner + axis) + slot];
-        let corner = |k: usize| Vec3::new(at(k, 0), at(k, 1), at(k, 2));
-        Some((leaf_triangle_ids(floats)[slot], [corner(0), corner(1), corner(2)]))
+        self.leaves.triangle(simd, words, leaf, slot)
     }
+}
 
-    /// The units with the leaves in `slots` of a row of references.
+impl ExpandedNodes {
+    const EMPTY: ExpandedNodes = ExpandedNodes {
+        units: [Unit::ZERO; NODES],
+        present: 0,
+        starts: [NodeStart::ZERO; MAX_NODES],
+        count: 0,
+        origin: [0.0; 3],
+        steps: [0.0; 3],
+    };
+
+    /// The node at unit `at`, which is expanded first where it is not. `words` start with the
+    /// meshlet, `leaves` are its.
     #[inline(always)]
-    pub(crate) fn with_many<S: Simd>(
+    pub(crate) fn with<S: Simd>(
         &mut self,
         simd: S,
         words: &[u32],
-        refs: &[u32; WIDTH],
-        mut slots: u32,
-    ) -> &[Unit] {
-        while slots != 0 {
-            self.with(simd, words, ChildRef(refs[slots.trailing_zeros() as usize & 7]));
-            slots &= slots - 1;
+        at: usize,
+        leaves: &mut ExpandedLeaves,
+    ) -> &[Unit; NODE_UNITS] {
+        let number = at / NODE_UNITS;
+        if self.present >> number & 1 == 0 {
+            self.expand(simd, words, number, leaves);
         }
-        &self.units
+        self.units[at..at + NODE_UNITS].try_into().expect("a slice of that length")
     }
 
     #[inline(never)]
-    fn expand<S: Simd>(&mut self, simd: S, words: &[u32], leaf: usize) {
+    fn expand<S: Simd>(
+        &mut self,
+        simd: S,
+        words: &[u32],
+        number: usize,
+        leaves: &mut ExpandedLeaves,
+    ) {
         simd.vectorize(
             #[inline(always)]
-            || self.expand_body(words, leaf),
+            || self.expand_body(words, number, leaves),
         );
     }
 
     #[inline(always)]
-    fn expand_body(&mut self, words: &[u32], leaf: usize) {
-        let [first, last] = self.triangles[leaf].map(u32::from);
-        let units = &mut self.units[TRI_LEAF_UNITS * leaf..][..TRI_LEAF_UNITS];
-        let floats: &mut [f32] = bytemuck::cast_slice_mut(units);
-        let floats: &mut [f32; 8 * TRI_LEAF_UNITS] = floats.try_into().expect("a leaf's units");
-        let count = (last.saturating_sub(first) as usize + 1).min(LEAF_SIZE);
-        // Copies: what is written cannot change them, so they need not be read again.
-        let (coordinates, index_bits, mask) = (self.coordinates, self.index_bits, self.vertex_mask);
-        let (indices, ids, id_bits, first_id) =
-            (self.indices, self.ids, self.id_bits, self.first_id);
-        // The three numbers together: 24 bits at most.
-        let three = 3 * index_bits;
-        for slot in 0..count {
-            let triangle = first + slot as u32;
-            let vertices = bits::read(words, indices + (triangle * three) as usize, three);
-            for corner in 0..3 {
-                let vertex = vertices >> (corner as u32 * index_bits) & mask;
-                for axis in 0..3 {
-                    floats[4 * (3 * corner + axis) + slot] = coordinates[axis].of(words, vertex);
-                }
-            }
-            let at = ids + (triangle * id_bits) as usize;
-            let id = first_id.wrapping_add(bits::read(words, at, id_bits));
-            floats[36 + slot] = f32::from_bits(id);
-        }
-        // Unused slots repeat the last triangle, as in the ordinary tree.
-        for row in floats.chunks_exact_mut(LEAF_SIZE) {
-            for slot in count..LEAF_SIZE {
-                row[slot] = row[count - 1];
+    fn expand_body(&mut self, words: &[u32], number: usize, leaves: &mut ExpandedLeaves) {
+        let start = self.starts[number];
+        let at = usize::from(start.word);
+        let kinds = words[at];
+        let there = Children::of(kinds);
+        let (mut node, mut leaf, mut triangle) =
+            (usize::from(start.node), usize::from(start.leaf), u32::from(start.triangle));
+        let units = &mut self.units[NODE_UNITS * number..][..NODE_UNITS];
+
+        // ---- Planes.
+        let count = there.count as usize;
+        let planes: &[u8] = bytemuck::cast_slice(&words[at + 1..]);
+        let (origin, steps) = (self.origin, self.steps);
+        for (row, unit) in units[..CHILD_ROW].iter_mut().enumerate() {
+            let q = eight_bytes(planes, row * count);
+            let (origin, step) = (origin[row / 2], steps[row / 2]);
+            // Boxes of no child are empty: as in the ordinary tree.
+            let empty = if row % 2 == 0 { f32::INFINITY } else { f32::NEG_INFINITY };
+            for (slot, (x, q)) in unit.0.iter_mut().zip(q).enumerate() {
+                *x = if slot < count { plane(origin, step, q) } else { empty };
             }
         }
-        self.present |= 1 << leaf;
+
+        // ---- References. Which child is a leaf is unpredictable, so this has no branches.
+        let children = units[CHILD_ROW].bits_mut();
+        for (slot, child) in children.iter_mut().enumerate() {
+            let kind = kinds >> (4 * slot);
+            let is_leaf = there.leaves >> (4 * slot) & 1 == 1;
+            let is_node = there.nodes >> (4 * slot) & 1 == 1;
+            let last = triangle + (kind & 3);
+            let to_leaf =
+                ChildRef::leaf(TRI_LEAF_UNITS * (leaf % MAX_LEAVES), (kind & 3) as usize + 1);
+            let to_node = ChildRef::node(NODE_UNITS * (node % MAX_NODES));
+            *child = if is_leaf {
+                to_leaf
+            } else if is_node {
+                to_node
+            } else {
+                ChildRef::NONE
+            }
+            .0;
+            leaves.set_triangles(if is_leaf { leaf } else { MAX_LEAVES }, triangle, last);
+            triangle = if is_leaf { last + 1 } else { triangle };
+            leaf += usize::from(is_leaf);
+            node += usize::from(is_node);
+        }
+        self.present |= 1 << number;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bvh::compact::meshlet::{NODE, NONE};
+    use crate::test_shapes::Random;
+
+    #[test]
+    fn kinds_of_children_are_counted_as_one_by_one() {
+        let mut r = Random::new(6);
+        for _ in 0..2000 {
+            let count = r.bits() as usize % 9;
+            let all: Vec<u32> =
+                (0..WIDTH)
+                    .map(|slot| {
+                        if slot < count { [0, 1, 2, 3, NODE][r.bits() as usize % 5] } else { NONE }
+                    })
+                    .collect();
+            let kinds = all.iter().rev().fold(0, |word, kind| word << 4 | kind);
+            let start = NodeStart { word: 11, node: 1, leaf: 2, triangle: 5 };
+            let leaves = all[..count].iter().filter(|&&kind| kind != NODE);
+            let triangles: u32 = leaves.clone().map(|kind| kind + 1).sum();
+            let expected = NodeStart {
+                word: 11 + 1 + (6 * count).div_ceil(4) as u16,
+                node: 1 + (count - leaves.clone().count()) as u8,
+                leaf: 2 + leaves.count() as u8,
+                triangle: 5 + triangles as u8,
+            };
+            assert_eq!(start.next(kinds), expected, "{kinds:08x}");
+        }
     }
 }

@@ -11,8 +11,8 @@
 //! boxes change the work alone.
 //!
 //! A ray that reaches a meshlet does not read it in this form: the calling thread [expands][cache]
-//! the small tree, and each leaf when a ray first reaches it, to the layout of the ordinary tree,
-//! and keeps the last few. So every kind of query uses its ordinary leaf test.
+//! each node and each leaf, when a ray first reaches it, to the layout of the ordinary tree, and
+//! keeps the last few meshlets. So every kind of query uses its ordinary leaf test.
 //!
 //! A sheet without any lattice takes 14.1 bytes per triangle (the test `compact_memory`), an
 //! isosurface on a lattice 13.6 (the example `storage`).
@@ -25,6 +25,7 @@ mod check;
 mod coordinates;
 mod cut;
 mod expand;
+mod expand_leaf;
 mod meshlet;
 mod pieces;
 mod place;
@@ -32,7 +33,8 @@ mod place;
 use super::layout::wide::WideBvh;
 pub(crate) use cache::{MeshletCache, new_key, with_cache};
 pub(crate) use check::check_units;
-pub(crate) use expand::{Expanded, ExpandedLeaves};
+pub(crate) use expand::Expanded;
+pub(crate) use expand_leaf::ExpandedLeaves;
 pub(crate) use pieces::{BYTES_WHILE_DIVIDED, Pieces, divide};
 pub(crate) use place::TrianglePlace;
 

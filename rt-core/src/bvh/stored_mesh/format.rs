@@ -3,7 +3,7 @@
 //! ```text
 //! byte 0     header: 128 bytes
 //!   0        the letters RTSVMESH
-//!   8        u32 version (1 or 2), u32 checksum of the header with zero in this place
+//!   8        u32 version (3), u32 checksum of the header with zero in this place
 //!   16       u64 length of the file, u64 byte of the table, u64 pages, u64 triangles,
 //!            u64 triangles that were left out
 //!   56       3 f64 origin
@@ -19,7 +19,7 @@
 //!   56       u32 words of attributes (32 bits each), u32 their checksum
 //! ```
 //!
-//! Version 1 has no attributes, and zeros in their places.
+//! Versions 1 and 2 had the numbers of meshlets in another order, and version 1 no attributes.
 //!
 //! Checksums are CRC-32 (IEEE 802.3). The header is written last: a file without it was not
 //! finished.
@@ -30,9 +30,7 @@ use crate::paging::fields::{Fields, checksum, get, get_u32, get_u64};
 use glam::{DVec3, Vec3};
 
 pub(super) const MAGIC: &[u8; 8] = b"RTSVMESH";
-pub(super) const VERSION: u32 = 2;
-/// The oldest version that can be read.
-const FIRST_VERSION: u32 = 1;
+pub(super) const VERSION: u32 = 3;
 pub(super) const HEADER_BYTES: usize = 128;
 pub(super) const ENTRY_BYTES: usize = 64;
 /// Bytes of a unit of a page.
@@ -160,7 +158,7 @@ impl Header {
             return Err(NoHeader::OtherFile);
         }
         let version = get_u32(bytes, 8);
-        if !(FIRST_VERSION..=VERSION).contains(&version) {
+        if version != VERSION {
             return Err(NoHeader::OtherVersion(version));
         }
         let mut without_sum = *bytes;

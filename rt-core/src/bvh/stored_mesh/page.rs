@@ -105,7 +105,7 @@ impl Page {
                 }
                 let meshlet = ChildRef::leaf(unit, 1);
                 let (expanded, words) = cache.meshlet(simd, key, units, meshlet);
-                if let Some((id, corners)) = expanded.leaves.triangle(simd, words, leaf, slot) {
+                if let Some((id, corners)) = expanded.triangle(simd, words, leaf, slot) {
                     found(lane, PageHit { first: self.first, id, corners });
                 }
             });

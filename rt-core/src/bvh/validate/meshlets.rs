@@ -58,7 +58,7 @@ impl CompactBvh {
         let units = &self.bvh.units;
         let (expanded, words) =
             dispatch!(level, simd => cache.meshlet(simd, self.key, units, meshlet));
-        let (nodes, leaves) = expanded.parts();
+        let (nodes, leaves) = dispatch!(level, simd => expanded.with_all_nodes(simd, words));
         // A box of the small tree may stick out of the one around it, which is rounded too.
         let mut todo = vec![(ChildRef::node(0), vec![bounds])];
         while let Some((child, around)) = todo.pop() {

@@ -22,8 +22,9 @@ const MAX_SINGLE_RAYS: u32 = 4;
 /// A subtree and the rays that hit its box.
 #[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
 struct Entry {
-    /// Distance of one of the rays to the box, for the order of visits. Not used for occlusion.
-    distance: f32,
+    /// For the order of visits, smallest first: the distance of one of the rays to the box. For
+    /// occlusion, minus the number of rays that reach it.
+    order: f32,
     child: u32,
     rays: u16,
 }
@@ -82,7 +83,7 @@ impl<T: TriangleTest, Q: HitQuery> Block<'_, T, Q> {
         let skip = f32x16::splat(simd, inflate_t(1.0));
         let mut memory = StackMemory::<Entry, STACK_SIZE>::new();
         let mut stack = Stack::empty(&mut memory);
-        stack.push(Entry { distance: 0.0, child: ChildRef::node(0).0, rays: self.active });
+        stack.push(Entry { order: 0.0, child: ChildRef::node(0).0, rays: self.active });
         while let Some(Entry { child, rays: met, .. }) = stack.pop() {
             let (child, met) = (ChildRef(child), met & self.active);
             if child.is_leaf() || met.count_ones() <= MAX_SINGLE_RAYS {
@@ -112,13 +113,15 @@ impl<T: TriangleTest, Q: HitQuery> Block<'_, T, Q> {
                     continue;
                 }
                 prefetch::<4, _>(tree.units, ChildRef(refs[slot]).unit());
-                let distance =
-                    if Q::ANY { 0.0 } else { near.as_slice()[hit.trailing_zeros() as usize & 15] };
-                stack.push(Entry { distance, child: refs[slot], rays: hit });
+                // What is in the way of many rays answers them before they part.
+                let order = if Q::ANY {
+                    -(hit.count_ones() as f32)
+                } else {
+                    near.as_slice()[hit.trailing_zeros() as usize & 15]
+                };
+                stack.push(Entry { order, child: refs[slot], rays: hit });
             }
-            if !Q::ANY {
-                stack.sort_descending_from(base);
-            }
+            stack.sort_descending_from(base);
         }
     }
 

@@ -3,7 +3,7 @@
 mod blocks;
 
 use crate::bvh::compact::{Expanded, MeshletCache, TrianglePlace, with_cache};
-use crate::bvh::layout::wide::{CHILD_ROW, ChildRef, NODE_UNITS, Unit, WIDTH};
+use crate::bvh::layout::wide::{CHILD_ROW, ChildRef, Unit, WIDTH};
 use crate::bvh::query::{HitQuery, TriangleTest};
 use crate::bvh::traverse::single::{
     BOX_SLACK, LeafTest, RaySetup, distances, leaf_slots, traverse, traverse_body,
@@ -80,8 +80,7 @@ fn visit<S: Simd, L: LeafTest<S>>(
     let (mut len, mut at) = (0, 0);
     loop {
         count(Counter::Nodes, 1);
-        let node: &[Unit; NODE_UNITS] =
-            nodes[at..at + NODE_UNITS].try_into().expect("a slice of that length");
+        let node = nodes.with(simd, words, at, leaves);
         let [x, y, z]: [f32x8<S>; 3] =
             three!(|a| distances(simd, node, ray.near[a], origin[a], rcp[a]));
         let near = x.max(y).max(z.max(t_min));

@@ -99,7 +99,7 @@ impl<S: Simd, T: TriangleTest, Q: HitQuery, O: PacketOrigin, B: BoxTest> PacketL
         _: &[u16; LANES],
     ) -> u16 {
         let (expanded, words) = self.cache.meshlet(simd, self.key, units, leaf);
-        let (nodes, leaves) = expanded.parts();
+        let (nodes, leaves) = expanded.with_all_nodes(simd, words);
         let (triangles, unit) = (&mut self.triangles, leaf.unit());
         let mut inner = MeshletLeaves { triangles, leaves, words, unit, changed: 0 };
         let groups = std::mem::replace(&mut packet.groups, reached);

@@ -1,0 +1,193 @@
+//! The leaves of an expanded meshlet.
+
+use super::bits;
+use super::coordinates::MAX_VALUES;
+use super::cut::MAX_LEAVES;
+use super::meshlet::{Header, Sections};
+use super::place::TrianglePlace;
+use crate::bvh::layout::triangles::{TRI_LEAF_UNITS, leaf_floats, leaf_triangle_ids};
+use crate::bvh::layout::wide::{ChildRef, LEAF_SIZE, Unit, WIDTH};
+use fearless_simd::Simd;
+use glam::Vec3;
+
+const LEAVES: usize = TRI_LEAF_UNITS * MAX_LEAVES;
+/// Corners of the triangles of a leaf.
+const CORNERS: usize = 3 * LEAF_SIZE;
+
+/// The leaves of an expanded meshlet, some of them not yet expanded.
+pub(crate) struct ExpandedLeaves {
+    units: [Unit; LEAVES],
+    /// The leaves that are in `units`.
+    present: u32,
+    /// First triangle and last triangle of each leaf that an expanded node names; the last place is
+    /// for children that are no leaves.
+    triangles: [[u8; 2]; MAX_LEAVES + 1],
+    index_bits: u32,
+    id_bits: u32,
+    first_id: u32,
+    sections: Sections,
+    /// Coordinates that are stored once, when they have been read.
+    values: [[f32; MAX_VALUES]; 3],
+    has_values: bool,
+}
+
+/// A reference to a leaf of an expanded meshlet.
+fn leaf_reference(leaf: usize) -> ChildRef {
+    ChildRef::leaf(TRI_LEAF_UNITS * leaf, LEAF_SIZE)
+}
+
+impl ExpandedLeaves {
+    pub(super) const EMPTY: ExpandedLeaves = ExpandedLeaves {
+        units: [Unit::ZERO; LEAVES],
+        present: 0,
+        triangles: [[0; 2]; MAX_LEAVES + 1],
+        index_bits: 0,
+        id_bits: 0,
+        first_id: 0,
+        sections: Sections::EMPTY,
+        values: [[0.0; MAX_VALUES]; 3],
+        has_values: false,
+    };
+
+    /// Takes the leaves of a meshlet whose nodes end before word `at`.
+    #[inline(always)]
+    pub(super) fn load(&mut self, header: &Header, at: usize) {
+        self.present = 0;
+        self.has_values = false;
+        (self.index_bits, self.id_bits) = (header.index_bits, header.id_bits);
+        self.first_id = header.first_id;
+        self.sections = header.sections(at);
+    }
+
+    /// Notes which triangles a leaf has; [`MAX_LEAVES`] is none.
+    #[inline(always)]
+    pub(super) fn set_triangles(&mut self, leaf: usize, first: u32, last: u32) {
+        self.triangles[leaf.min(MAX_LEAVES)] = [first as u8, last as u8];
+    }
+
+    /// The units that hold `leaf`, which is expanded first where it is not. `words` start with the
+    /// meshlet.
+    #[inline(always)]
+    pub(crate) fn with<S: Simd>(&mut self, simd: S, words: &[u32], leaf: ChildRef) -> &[Unit] {
+        let number = leaf.unit() / TRI_LEAF_UNITS;
+        if self.present >> number & 1 == 0 {
+            self.expand(simd, words, number);
+        }
+        &self.units
+    }
+
+    /// The place of triangle `id` of the meshlet at `unit`, among the leaves that are expanded.
+    #[inline(never)]
+    pub(crate) fn place_of(&self, unit: usize, id: u32) -> TrianglePlace {
+        for leaf in (0..MAX_LEAVES).filter(|leaf| self.present >> leaf & 1 == 1) {
+            let ids = leaf_triangle_ids(leaf_floats(&self.units, leaf_reference(leaf)));
+            if let Some(slot) = ids.iter().position(|&i| i == id) {
+                return TrianglePlace::of_leaf(unit, leaf).in_slot(slot);
+            }
+        }
+        TrianglePlace::NONE
+    }
+
+    /// Whether a leaf is expanded.
+    #[inline(always)]
+    pub(super) fn has(&self, leaf: usize) -> bool {
+        leaf < MAX_LEAVES && self.present >> leaf & 1 == 1
+    }
+
+    /// The number and the corners of the triangle in a slot of a leaf whose node is expanded.
+    /// `None` when there is no such leaf.
+    #[inline(always)]
+    pub(super) fn triangle<S: Simd>(
+        &mut self,
+        simd: S,
+        words: &[u32],
+        leaf: usize,
+        slot: usize,
+    ) -> Option<(u32, [Vec3; 3])> {
+        if leaf >= MAX_LEAVES || slot >= LEAF_SIZE {
+            return None;
+        }
+        let reference = leaf_reference(leaf);
+        let floats = leaf_floats(self.with(simd, words, reference), reference);
+        let at = |corner: usize, axis: usize| floats[4 * (3 * corner + axis) + slot];
+        let corner = |k: usize| Vec3::new(at(k, 0), at(k, 1), at(k, 2));
+        Some((leaf_triangle_ids(floats)[slot], [corner(0), corner(1), corner(2)]))
+    }
+
+    /// The units with the leaves in `slots` of a row of references.
+    #[inline(always)]
+    pub(crate) fn with_many<S: Simd>(
+        &mut self,
+        simd: S,
+        words: &[u32],
+        refs: &[u32; WIDTH],
+        mut slots: u32,
+    ) -> &[Unit] {
+        while slots != 0 {
+            self.with(simd, words, ChildRef(refs[slots.trailing_zeros() as usize & 7]));
+            slots &= slots - 1;
+        }
+        &self.units
+    }
+
+    #[inline(never)]
+    fn expand<S: Simd>(&mut self, simd: S, words: &[u32], leaf: usize) {
+        simd.vectorize(
+            #[inline(always)]
+            || self.expand_body(words, leaf),
+        );
+    }
+
+    #[inline(always)]
+    fn expand_body(&mut self, words: &[u32], leaf: usize) {
+        // Copies: what is written cannot change them, so they need not be read again.
+        let (sections, index_bits, first_id) = (self.sections, self.index_bits, self.first_id);
+        if !self.has_values {
+            for (coordinates, values) in sections.coordinates.iter().zip(&mut self.values) {
+                coordinates.read_values(words, values);
+            }
+            self.has_values = true;
+        }
+        let [first, last] = self.triangles[leaf].map(u32::from);
+        let units = &mut self.units[TRI_LEAF_UNITS * leaf..][..TRI_LEAF_UNITS];
+        let floats: &mut [f32] = bytemuck::cast_slice_mut(units);
+        let floats: &mut [f32; 8 * TRI_LEAF_UNITS] = floats.try_into().expect("a leaf's units");
+
+        // ---- Triangles: one read each. Unused slots repeat the last triangle, as in the ordinary
+        // tree.
+        let vertex_mask = (1 << index_bits) - 1;
+        let id_mask = (1u64 << self.id_bits) - 1;
+        let mut starts = [0; CORNERS];
+        for slot in 0..LEAF_SIZE {
+            let number = (first + slot as u32).min(last);
+            let triangle =
+                bits::read_64(words, sections.triangles + (number * sections.triangle) as usize);
+            for corner in 0..3 {
+                let vertex = (triangle >> (corner as u32 * index_bits)) as u32 & vertex_mask;
+                starts[LEAF_SIZE * corner + slot] =
+                    sections.vertices + (vertex * sections.vertex) as usize;
+            }
+            let id = first_id.wrapping_add((triangle >> (3 * index_bits) & id_mask) as u32);
+            floats[4 * 9 + slot] = f32::from_bits(id);
+        }
+
+        // ---- Corners: one read each, where 64 bits suffice.
+        let mut vertices = [0; CORNERS];
+        for (vertex, at) in vertices.iter_mut().zip(starts) {
+            *vertex = bits::read_64(words, at);
+        }
+        for axis in 0..3 {
+            if axis == 2 && !sections.one_read() {
+                for (vertex, at) in vertices.iter_mut().zip(starts) {
+                    *vertex = bits::read_64(words, at + sections.before_z as usize);
+                }
+            }
+            let row = sections.coordinates[axis].of(&vertices, &self.values[axis]);
+            for corner in 0..3 {
+                floats[4 * (3 * corner + axis)..][..LEAF_SIZE]
+                    .copy_from_slice(&row[LEAF_SIZE * corner..][..LEAF_SIZE]);
+            }
+        }
+        self.present |= 1 << leaf;
+    }
+}
