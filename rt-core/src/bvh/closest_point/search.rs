@@ -61,6 +61,7 @@ impl<'w> Search<'w> {
         if tree.meshlets() != 0 {
             let level = self.world.level;
             with_cache(|cache| {
+                let mut cache = cache.borrow_mut();
                 self.visit(units, local, scale2, |search, leaf| {
                     let (expanded, words) =
                         dispatch!(level, simd => cache.meshlet(simd, tree.meshlets(), units, leaf));

@@ -3,7 +3,7 @@
 use super::expand::Expanded;
 use crate::bvh::layout::wide::{ChildRef, Unit};
 use fearless_simd::Simd;
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Expanded meshlets per thread, as a power of two: 1.4 MiB, of which mostly a part is in use.
@@ -23,9 +23,9 @@ pub(crate) struct MeshletCache {
 }
 
 impl MeshletCache {
-    fn new() -> Box<MeshletCache> {
+    fn new() -> Box<RefCell<MeshletCache>> {
         let expanded = (0..1 << SLOTS_LOG2).map(|_| Expanded::EMPTY).collect();
-        Box::new(MeshletCache { held: [(0, 0); 1 << SLOTS_LOG2], expanded })
+        Box::new(RefCell::new(MeshletCache { held: [(0, 0); 1 << SLOTS_LOG2], expanded }))
     }
 
     /// The meshlet `leaf` of the tree with this key, expanded, and the words that it starts.
@@ -57,15 +57,15 @@ impl MeshletCache {
 }
 
 thread_local! {
-    static CACHE: Cell<Option<Box<MeshletCache>>> = const { Cell::new(None) };
+    static CACHE: Cell<Option<Box<RefCell<MeshletCache>>>> = const { Cell::new(None) };
 }
 
-/// Calls `work` with the thread's meshlets. A query inside `work`, from a caller's function, starts
-/// without any.
+/// Calls `work` with the thread's meshlets, which rays that are under way at once share. A query
+/// inside `work`, from a caller's function, starts without any.
 #[inline]
-pub(crate) fn with_cache<R>(work: impl FnOnce(&mut MeshletCache) -> R) -> R {
-    let mut cache = CACHE.take().unwrap_or_else(MeshletCache::new);
-    let result = work(&mut cache);
+pub(crate) fn with_cache<R>(work: impl FnOnce(&RefCell<MeshletCache>) -> R) -> R {
+    let cache = CACHE.take().unwrap_or_else(MeshletCache::new);
+    let result = work(&cache);
     CACHE.set(Some(cache));
     result
 }

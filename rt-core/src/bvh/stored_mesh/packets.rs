@@ -4,7 +4,7 @@ use super::{StoredMesh, recent_hits};
 use crate::bvh::compact::TrianglePlace;
 use crate::bvh::query::{HitQuery, WatertightTest};
 use crate::bvh::shape_packets::PacketShape;
-use crate::bvh::traverse::meshlets;
+use crate::bvh::traverse::incoherent;
 use crate::bvh::traverse::packet::{Packet, PacketPart};
 use crate::ray::{HitBlock, LANES, RayBlock};
 use fearless_simd::Simd;
@@ -22,13 +22,9 @@ impl PacketShape for StoredMesh {
         places: &mut [[TrianglePlace; LANES]],
     ) {
         self.with_page(page, |page| {
-            meshlets::trace_blocks::<S, WatertightTest, Q>(
-                simd,
-                &page.view(),
-                rays,
-                hits,
-                0,
-                places,
+            let view = page.view();
+            incoherent::trace_keeping_places::<S, WatertightTest, Q>(
+                simd, &view, rays, hits, 0, places,
             );
         });
     }

@@ -98,6 +98,7 @@ impl Page {
     ) {
         let (units, key) = (&self.tree.bvh.units, self.tree.key);
         with_cache(|cache| {
+            let mut cache = cache.borrow_mut();
             dispatch!(level, simd => for lane in set_bits(lanes) {
                 let Some((unit, leaf, slot)) = places[lane].parts() else { continue };
                 if unit >= units.len() {

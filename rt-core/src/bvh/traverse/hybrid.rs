@@ -14,9 +14,11 @@
 
 use super::block_boxes::BlockSetup;
 use super::interleaved::{RayQueue, RayStack, RayTask, traverse_interleaved};
+use super::leaf_kind::LeafKind;
 use super::single::{RaySetup, inflate_t};
 use super::tree_view::TreeView;
 use crate::bvh::Unit;
+use crate::bvh::compact::TrianglePlace;
 use crate::bvh::layout::wide::{CHILD_ROW, ChildRef, NODE_UNITS, STACK_SIZE};
 use crate::bvh::query::{HitQuery, TriangleTest};
 use crate::bvh::traverse::triangle_leaf::{AnyLeaf, ClosestLeaf, ClosestTri};
@@ -47,15 +49,23 @@ struct Entry {
 }
 
 /// Traces the rays of a block through a triangle hierarchy and writes the results into `hits` (for
-/// occlusion, `prim` is 0 where something blocks the ray).
+/// occlusion, `prim` is 0 where something blocks the ray). `places` gets where the closest triangles
+/// lie, in trees that keep it.
 #[inline(always)]
-pub(super) fn trace<S: Simd, T: TriangleTest, Q: HitQuery>(
+pub(super) fn trace<S, T, Q, K>(
     simd: S,
     tree: &TreeView<'_>,
+    kind: K,
     rays: &RayBlock,
     hits: &mut HitBlock,
+    mut places: Option<&mut [TrianglePlace; LANES]>,
     instance: u32,
-) {
+) where
+    S: Simd,
+    T: TriangleTest,
+    Q: HitQuery,
+    K: for<'r> LeafKind<'r>,
+{
     let units = tree.units;
     let mut active = rays.active_lanes();
     let block = BlockSetup::new(simd, rays);
@@ -81,11 +91,13 @@ pub(super) fn trace<S: Simd, T: TriangleTest, Q: HitQuery>(
             let start = child;
             if Q::ANY {
                 let (t, active, test) = (&t, &mut active, PhantomData::<T>);
-                let mut queue = AnyQueue { setups, t, start, met, hits, active, test };
+                let mut queue = AnyQueue { setups, t, start, met, hits, active, kind, test };
                 traverse_interleaved::<IN_TURNS, _, _>(simd, tree, &mut queue);
             } else {
                 let (t, test) = (&mut t, PhantomData::<T>);
-                let mut queue = ClosestQueue { setups, t, start, met, hits, instance, test };
+                let places = places.as_deref_mut();
+                let mut queue =
+                    ClosestQueue { setups, t, start, met, hits, places, instance, kind, test };
                 traverse_interleaved::<IN_TURNS, _, _>(simd, tree, &mut queue);
             }
             continue;
@@ -129,18 +141,20 @@ pub(super) fn trace<S: Simd, T: TriangleTest, Q: HitQuery>(
 }
 
 /// Lanes for which the closest hit in the subtree at `start` is requested.
-struct ClosestQueue<'a, 'r, T> {
+struct ClosestQueue<'a, 'r, T, K> {
     setups: &'r [RaySetup; LANES],
     t: &'a mut [f32; LANES],
     start: ChildRef,
     met: u16,
     hits: &'a mut HitBlock,
+    places: Option<&'a mut [TrianglePlace; LANES]>,
     instance: u32,
+    kind: K,
     test: PhantomData<T>,
 }
 
-impl<'r, S: Simd, T: TriangleTest> RayQueue<'r, S> for ClosestQueue<'_, 'r, T> {
-    type Leaf = ClosestLeaf<'r, T>;
+impl<'r, S: Simd, T: TriangleTest, K: LeafKind<'r>> RayQueue<'r, S> for ClosestQueue<'_, 'r, T, K> {
+    type Leaf = K::Leaf<S, ClosestLeaf<'r, T>>;
 
     #[inline(always)]
     fn next(&mut self, stack: &mut RayStack<'_>) -> Option<RayTask<'r, Self::Leaf>> {
@@ -152,14 +166,18 @@ impl<'r, S: Simd, T: TriangleTest> RayQueue<'r, S> for ClosestQueue<'_, 'r, T> {
         let found = hits.prim[lane] != crate::ray::NO_HIT;
         let prim = if found { hits.prim[lane] } else { 0 };
         let best = ClosestTri { t: self.t[lane], u: hits.u[lane], v: hits.v[lane], prim, found };
-        let leaf = ClosestLeaf::continuing(ray, best);
+        let leaf = self.kind.around(ray, ClosestLeaf::continuing(ray, best));
         stack.push(self.start.0 as u64);
         Some(RayTask { number: lane, ray, t_max: best.t, leaf })
     }
 
     #[inline(always)]
     fn done(&mut self, lane: usize, leaf: Self::Leaf) {
+        let (leaf, place) = K::found(leaf);
         let (b, lane) = (leaf.best, lane & 15);
+        if let (Some(places), Some(place)) = (&mut self.places, place) {
+            places[lane] = place;
+        }
         if b.found {
             self.t[lane] = b.t;
             (self.hits.t[lane], self.hits.u[lane], self.hits.v[lane]) = (b.t, b.u, b.v);
@@ -169,18 +187,19 @@ impl<'r, S: Simd, T: TriangleTest> RayQueue<'r, S> for ClosestQueue<'_, 'r, T> {
 }
 
 /// Lanes for which any hit in the subtree at `start` is requested.
-struct AnyQueue<'a, 'r, T> {
+struct AnyQueue<'a, 'r, T, K> {
     setups: &'r [RaySetup; LANES],
     t: &'a [f32; LANES],
     start: ChildRef,
     met: u16,
     hits: &'a mut HitBlock,
     active: &'a mut u16,
+    kind: K,
     test: PhantomData<T>,
 }
 
-impl<'r, S: Simd, T: TriangleTest> RayQueue<'r, S> for AnyQueue<'_, 'r, T> {
-    type Leaf = AnyLeaf<'r, T>;
+impl<'r, S: Simd, T: TriangleTest, K: LeafKind<'r>> RayQueue<'r, S> for AnyQueue<'_, 'r, T, K> {
+    type Leaf = K::Leaf<S, AnyLeaf<'r, T>>;
 
     #[inline(always)]
     fn next(&mut self, stack: &mut RayStack<'_>) -> Option<RayTask<'r, Self::Leaf>> {
@@ -190,12 +209,13 @@ impl<'r, S: Simd, T: TriangleTest> RayQueue<'r, S> for AnyQueue<'_, 'r, T> {
         let lane = take_lane(&mut self.met);
         let (ray, t_max) = (&self.setups[lane], self.t[lane]);
         stack.push(self.start.0 as u64);
-        Some(RayTask { number: lane, ray, t_max, leaf: AnyLeaf::new(ray, t_max) })
+        let leaf = self.kind.around(ray, AnyLeaf::new(ray, t_max));
+        Some(RayTask { number: lane, ray, t_max, leaf })
     }
 
     #[inline(always)]
     fn done(&mut self, lane: usize, leaf: Self::Leaf) {
-        if leaf.found {
+        if K::found(leaf).0.found {
             self.hits.prim[lane & 15] = 0;
             *self.active &= !(1 << (lane & 15));
         }

@@ -1,14 +1,18 @@
 //! Traces blocks of rays in any direction through a triangle hierarchy.
 
+use super::leaf_kind::{LeafKind, OfTriangles};
+use super::meshlets::InMeshlets;
+use super::scattered::BlockSet;
 use super::three;
 use super::tree_view::TreeView;
-use super::{hybrid, meshlets, scattered};
+use super::{hybrid, scattered};
 use crate::bvh::Unit;
+use crate::bvh::compact::{TrianglePlace, with_cache};
 use crate::bvh::layout::wide::NODE_UNITS;
 use crate::bvh::query::{HitQuery, TriangleTest};
 use crate::bvh::traverse::packet::GROUPS;
 use crate::bvh::traverse::timed_choice::TimedChoice;
-use crate::ray::{HitBlock, RayBlock};
+use crate::ray::{HitBlock, LANES, RayBlock};
 use fearless_simd::{Select, Simd, SimdBase, SimdMask, f32x8, f32x16, mask32x16};
 use std::cell::Cell;
 
@@ -23,13 +27,14 @@ const FROM_THE_ROOT: usize = 1;
 thread_local! {
     /// The faster way for closest hits and for occlusion. From the root in turns, ambient occlusion
     /// is up to 1.4 times slower on isosurfaces and 1.1 times faster among long thin triangles.
-    static CHOICES: Cell<[TimedChoice<2>; 2]> =
-        const { Cell::new([TimedChoice::new(SHARED_START); 2]) };
+    /// Of compact trees, their own.
+    static CHOICES: Cell<[[TimedChoice<2>; 2]; 2]> =
+        const { Cell::new([[TimedChoice::new(SHARED_START); 2]; 2]) };
 }
 
 /// Traces blocks of rays and writes the results into `hits`, as long as `rays` (for occlusion,
 /// `prim` is 0 where something blocks the ray).
-#[inline(never)]
+#[inline(always)]
 pub(crate) fn trace<S: Simd, T: TriangleTest, Q: HitQuery>(
     simd: S,
     tree: &TreeView<'_>,
@@ -37,13 +42,50 @@ pub(crate) fn trace<S: Simd, T: TriangleTest, Q: HitQuery>(
     hits: &mut [HitBlock],
     instance: u32,
 ) {
-    if tree.meshlets() != 0 {
-        meshlets::trace_blocks::<S, T, Q>(simd, tree, rays, hits, instance, &mut []);
+    trace_keeping_places::<S, T, Q>(simd, tree, rays, hits, instance, &mut []);
+}
+
+/// As [`trace`]. `places` gets where the closest triangles of a compact tree lie, for as many
+/// blocks as it has rows.
+pub(crate) fn trace_keeping_places<S: Simd, T: TriangleTest, Q: HitQuery>(
+    simd: S,
+    tree: &TreeView<'_>,
+    rays: &[RayBlock],
+    hits: &mut [HitBlock],
+    instance: u32,
+    places: &mut [[TrianglePlace; LANES]],
+) {
+    let key = tree.meshlets();
+    if key == 0 {
+        trace_kind::<S, T, Q, _>(simd, tree, OfTriangles, rays, hits, places, instance);
         return;
     }
+    with_cache(|cache| {
+        let kind = InMeshlets { cache, key, keeps_places: !places.is_empty() };
+        trace_kind::<S, T, Q, _>(simd, tree, kind, rays, hits, places, instance);
+    });
+}
+
+#[inline(never)]
+fn trace_kind<S, T, Q, K>(
+    simd: S,
+    tree: &TreeView<'_>,
+    kind: K,
+    rays: &[RayBlock],
+    hits: &mut [HitBlock],
+    mut places: &mut [[TrianglePlace; LANES]],
+    instance: u32,
+) where
+    S: Simd,
+    T: TriangleTest,
+    Q: HitQuery,
+    K: for<'r> LeafKind<'r>,
+{
     for (rays, hits) in rays.chunks(GROUPS).zip(hits.chunks_mut(GROUPS)) {
+        let here;
+        (here, places) = places.split_at_mut(rays.len().min(places.len()));
         let mut choices = CHOICES.get();
-        let choice = &mut choices[Q::ANY as usize];
+        let choice = &mut choices[usize::from(K::COMPACT)][usize::from(Q::ANY)];
         let (way, start) = choice.next(|_| true);
         let mut together = 0;
         simd.vectorize(
@@ -55,13 +97,15 @@ pub(crate) fn trace<S: Simd, T: TriangleTest, Q: HitQuery>(
                     let shares = start_together(simd, r, reach);
                     together += u32::from(shares);
                     if shares && way != FROM_THE_ROOT {
-                        hybrid::trace::<S, T, Q>(simd, tree, r, h, instance);
+                        let place = here.get_mut(b);
+                        hybrid::trace::<S, T, Q, K>(simd, tree, kind, r, h, place, instance);
                     } else {
                         apart |= 1 << b;
                     }
                 }
                 if apart != 0 {
-                    scattered::trace::<S, T, Q>(simd, tree, rays, apart, hits, instance);
+                    let set = BlockSet { rays, chosen: apart };
+                    scattered::trace::<S, T, Q, K>(simd, tree, kind, set, hits, here, instance);
                 }
             },
         );

@@ -96,7 +96,7 @@ impl<'r, L: Copy> Lane<'r, L> {
             return true;
         }
         if self.current.is_leaf() {
-            // The queue pushed a leaf.
+            // The queue pushed a leaf, or leaves are visited in the order of their distance.
             count(Counter::Leaves, 1);
             if self.leaf.test(simd, units, self.current, &mut self.skip_t) {
                 return true;
@@ -117,7 +117,7 @@ impl<'r, L: Copy> Lane<'r, L> {
     {
         let at = self.current.unit();
         let NodeHits { leaves, next } =
-            open_node::<S, L::Query>(simd, tree, at, self.ray, self.skip_t, true, stack);
+            open_node::<S, L::Query>(simd, tree, at, self.ray, self.skip_t, !L::TREES, stack);
         (self.leaves, self.parent) = (leaves, at);
         self.current = match next {
             Some(next) => next,

@@ -7,6 +7,7 @@ mod child_order;
 mod hybrid;
 pub(crate) mod incoherent;
 pub(crate) mod interleaved;
+pub(crate) mod leaf_kind;
 pub(crate) mod meshlets;
 pub(crate) mod packet;
 mod scattered;

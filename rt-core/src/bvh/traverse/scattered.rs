@@ -7,9 +7,11 @@
 
 use super::block_boxes::BlockSetup;
 use super::interleaved::{RayQueue, RayStack, RayTask, traverse_interleaved};
+use super::leaf_kind::LeafKind;
 use super::packet::GROUPS;
 use super::single::RaySetup;
 use super::tree_view::TreeView;
+use crate::bvh::compact::TrianglePlace;
 use crate::bvh::layout::wide::ChildRef;
 use crate::bvh::query::{HitQuery, TriangleTest};
 use crate::bvh::traverse::triangle_leaf::{AnyLeaf, ClosestLeaf};
@@ -24,46 +26,64 @@ use std::marker::PhantomData;
 const CLOSEST_IN_TURNS: usize = 12;
 const ANY_IN_TURNS: usize = 16;
 
-/// Traces the rays of `blocks`, a set of at most sixteen blocks of `rays`, and writes the results
-/// into `hits` (for occlusion, `prim` is 0 where something blocks the ray).
+/// At most sixteen blocks, of which some are to be traced.
+#[derive(Clone, Copy)]
+pub(super) struct BlockSet<'a> {
+    pub(super) rays: &'a [RayBlock],
+    pub(super) chosen: u16,
+}
+
+/// Traces the rays of the chosen blocks and writes the results into `hits`, as long as there are
+/// blocks (for occlusion, `prim` is 0 where something blocks the ray). `places` gets where the
+/// closest triangles lie, for as many blocks as it has rows, in trees that keep it.
 #[inline(always)]
-pub(super) fn trace<S: Simd, T: TriangleTest, Q: HitQuery>(
+pub(super) fn trace<S, T, Q, K>(
     simd: S,
     tree: &TreeView<'_>,
-    rays: &[RayBlock],
-    blocks: u16,
+    kind: K,
+    set: BlockSet<'_>,
     hits: &mut [HitBlock],
+    places: &mut [[TrianglePlace; LANES]],
     instance: u32,
-) {
+) where
+    S: Simd,
+    T: TriangleTest,
+    Q: HitQuery,
+    K: for<'r> LeafKind<'r>,
+{
+    let BlockSet { rays, chosen: blocks } = set;
     let mut setups = [[RaySetup::ZERO; LANES]; GROUPS];
     let mut active = [0; GROUPS];
     for (b, rays) in rays.iter().enumerate().take(GROUPS).filter(|(b, _)| blocks >> b & 1 == 1) {
         active[b] = rays.active_lanes();
         setups[b] = BlockSetup::new(simd, rays).rays(rays);
     }
-    let queue = Scattered { rays, setups: &setups, hits, active, blocks, instance };
+    let setups = &setups;
+    let queue = Scattered { rays, setups, hits, places, active, blocks, instance, kind };
     if Q::ANY {
-        let mut queue = AnyRays::<T>(queue, PhantomData);
+        let mut queue = AnyRays::<T, K>(queue, PhantomData);
         traverse_interleaved::<ANY_IN_TURNS, _, _>(simd, tree, &mut queue);
     } else {
-        let mut queue = ClosestRays::<T>(queue, PhantomData);
+        let mut queue = ClosestRays::<T, K>(queue, PhantomData);
         traverse_interleaved::<CLOSEST_IN_TURNS, _, _>(simd, tree, &mut queue);
     }
 }
 
 /// The rays that have not been traced yet.
-struct Scattered<'a, 'r> {
+struct Scattered<'a, 'r, K> {
     rays: &'a [RayBlock],
     setups: &'r [[RaySetup; LANES]; GROUPS],
     hits: &'a mut [HitBlock],
+    places: &'a mut [[TrianglePlace; LANES]],
     /// Lanes to trace, per block.
     active: [u16; GROUPS],
     /// Blocks to trace.
     blocks: u16,
     instance: u32,
+    kind: K,
 }
 
-impl Scattered<'_, '_> {
+impl<K> Scattered<'_, '_, K> {
     /// The block and the lane of the next ray.
     #[inline(always)]
     fn take(&mut self, stack: &mut RayStack<'_>) -> Option<(usize, usize)> {
@@ -83,21 +103,26 @@ impl Scattered<'_, '_> {
 }
 
 /// Asks for the closest hits.
-struct ClosestRays<'a, 'r, T>(Scattered<'a, 'r>, PhantomData<T>);
+struct ClosestRays<'a, 'r, T, K>(Scattered<'a, 'r, K>, PhantomData<T>);
 
-impl<'r, S: Simd, T: TriangleTest> RayQueue<'r, S> for ClosestRays<'_, 'r, T> {
-    type Leaf = ClosestLeaf<'r, T>;
+impl<'r, S: Simd, T: TriangleTest, K: LeafKind<'r>> RayQueue<'r, S> for ClosestRays<'_, 'r, T, K> {
+    type Leaf = K::Leaf<S, ClosestLeaf<'r, T>>;
 
     #[inline(always)]
     fn next(&mut self, stack: &mut RayStack<'_>) -> Option<RayTask<'r, Self::Leaf>> {
         let (b, lane) = self.0.take(stack)?;
         let (ray, t_max) = (&self.0.setups[b][lane], self.0.rays[b].t_max[lane]);
-        Some(RayTask { number: b * LANES + lane, ray, t_max, leaf: ClosestLeaf::new(ray, t_max) })
+        let leaf = self.0.kind.around(ray, ClosestLeaf::new(ray, t_max));
+        Some(RayTask { number: b * LANES + lane, ray, t_max, leaf })
     }
 
     #[inline(always)]
     fn done(&mut self, number: usize, leaf: Self::Leaf) {
+        let (leaf, place) = K::found(leaf);
         let b = leaf.best;
+        if let (Some(places), Some(place)) = (self.0.places.get_mut(number / LANES), place) {
+            places[number % LANES] = place;
+        }
         if b.found {
             let (h, lane) = (&mut self.0.hits[number / LANES], number % LANES);
             (h.t[lane], h.u[lane], h.v[lane]) = (b.t, b.u, b.v);
@@ -107,21 +132,22 @@ impl<'r, S: Simd, T: TriangleTest> RayQueue<'r, S> for ClosestRays<'_, 'r, T> {
 }
 
 /// Asks whether there are hits.
-struct AnyRays<'a, 'r, T>(Scattered<'a, 'r>, PhantomData<T>);
+struct AnyRays<'a, 'r, T, K>(Scattered<'a, 'r, K>, PhantomData<T>);
 
-impl<'r, S: Simd, T: TriangleTest> RayQueue<'r, S> for AnyRays<'_, 'r, T> {
-    type Leaf = AnyLeaf<'r, T>;
+impl<'r, S: Simd, T: TriangleTest, K: LeafKind<'r>> RayQueue<'r, S> for AnyRays<'_, 'r, T, K> {
+    type Leaf = K::Leaf<S, AnyLeaf<'r, T>>;
 
     #[inline(always)]
     fn next(&mut self, stack: &mut RayStack<'_>) -> Option<RayTask<'r, Self::Leaf>> {
         let (b, lane) = self.0.take(stack)?;
         let (ray, t_max) = (&self.0.setups[b][lane], self.0.rays[b].t_max[lane]);
-        Some(RayTask { number: b * LANES + lane, ray, t_max, leaf: AnyLeaf::new(ray, t_max) })
+        let leaf = self.0.kind.around(ray, AnyLeaf::new(ray, t_max));
+        Some(RayTask { number: b * LANES + lane, ray, t_max, leaf })
     }
 
     #[inline(always)]
     fn done(&mut self, number: usize, leaf: Self::Leaf) {
-        if leaf.found {
+        if K::found(leaf).0.found {
             self.0.hits[number / LANES].prim[number % LANES] = 0;
         }
     }

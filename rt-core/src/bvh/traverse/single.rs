@@ -99,6 +99,10 @@ pub(crate) trait LeafTest<S: Simd> {
     /// entered their boxes.
     const TOGETHER: bool = false;
 
+    /// Whether leaves are trees of their own, so that a far one is better left until nearer ones
+    /// have been searched.
+    const TREES: bool = false;
+
     /// Tests the primitives of the leaves in `leaves`, a set of slots in a row of references.
     #[inline(always)]
     fn test_many(

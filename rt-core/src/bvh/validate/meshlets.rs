@@ -18,6 +18,7 @@ impl CompactBvh {
         let mut stats = TreeStats::default();
         let mut todo = vec![(ChildRef::node(0), self.bvh.bounds, 1)];
         with_cache(|cache| {
+            let cache = &mut *cache.borrow_mut();
             while let Some((child, bounds, depth)) = todo.pop() {
                 if child.is_leaf() {
                     self.validate_meshlet(cache, child, bounds, &mut stats, &mut mark, &triangle)?;

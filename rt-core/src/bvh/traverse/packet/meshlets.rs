@@ -19,6 +19,7 @@ use crate::bvh::traverse::triangle_leaf::{AnyLeaf, ClosestLeaf, ClosestTri};
 use crate::ray::LANES;
 use crate::stats::{Counter, count};
 use fearless_simd::Simd;
+use std::cell::RefCell;
 use std::marker::PhantomData;
 
 impl Packet {
@@ -72,13 +73,13 @@ impl Packet {
 /// The leaf test of compact trees.
 struct Meshlets<'c, T, Q, O, B> {
     triangles: Triangles<T, Q, O>,
-    cache: &'c mut MeshletCache,
+    cache: &'c RefCell<MeshletCache>,
     key: u64,
     boxes: PhantomData<B>,
 }
 
 impl<'c, T: TriangleTest, Q: HitQuery, O: PacketOrigin, B> Meshlets<'c, T, Q, O, B> {
-    fn new(cache: &'c mut MeshletCache, tree: &TreeView<'_>) -> Self {
+    fn new(cache: &'c RefCell<MeshletCache>, tree: &TreeView<'_>) -> Self {
         Meshlets { triangles: Triangles::new(), cache, key: tree.meshlets(), boxes: PhantomData }
     }
 }
@@ -98,7 +99,8 @@ impl<S: Simd, T: TriangleTest, Q: HitQuery, O: PacketOrigin, B: BoxTest> PacketL
         reached: u16,
         _: &[u16; LANES],
     ) -> u16 {
-        let (expanded, words) = self.cache.meshlet(simd, self.key, units, leaf);
+        let mut cache = self.cache.borrow_mut();
+        let (expanded, words) = cache.meshlet(simd, self.key, units, leaf);
         let (nodes, leaves) = expanded.with_all_nodes(simd, words);
         let (triangles, unit) = (&mut self.triangles, leaf.unit());
         let mut inner = MeshletLeaves { triangles, leaves, words, unit, changed: 0 };
@@ -153,10 +155,11 @@ impl<T: TriangleTest, Q: HitQuery, O, B> Meshlets<'_, T, Q, O, B> {
         lane: usize,
     ) -> u16 {
         let (ray, t) = (&packet.setup(g, lane), packet.t[g][lane]);
-        let (cache, key) = (&mut *self.cache, self.key);
+        let (cache, key, keeps_places) = (self.cache, self.key, !Q::ANY && packet.keeps_places);
+        let kind = meshlets::InMeshlets { cache, key, keeps_places };
         if Q::ANY {
             let inner = AnyLeaf::<T>::new(ray, t);
-            let mut leaves = meshlets::Meshlets::new(cache, key, ray, inner);
+            let mut leaves = kind.meshlets(ray, inner);
             traverse_from(simd, tree, ray, t, node, &mut leaves);
             if !leaves.inner.found {
                 return 0;
@@ -168,8 +171,7 @@ impl<T: TriangleTest, Q: HitQuery, O, B> Meshlets<'_, T, Q, O, B> {
             let (u, v) = (packet.u[g][lane], packet.v[g][lane]);
             let best = ClosestTri { t, u, v, prim: packet.prim[g][lane], found };
             let inner = ClosestLeaf::<T>::continuing(ray, best);
-            let mut leaves = meshlets::Meshlets::new(cache, key, ray, inner);
-            leaves.keeps_place = packet.keeps_places;
+            let mut leaves = kind.meshlets(ray, inner);
             traverse_from(simd, tree, ray, t, node, &mut leaves);
             let b = leaves.inner.best;
             if !b.found {

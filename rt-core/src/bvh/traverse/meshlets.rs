@@ -1,10 +1,10 @@
-//! Rays through a compact tree: each by itself here, in blocks in [`blocks`].
-
-mod blocks;
+//! Rays through a compact tree: the ordinary traversals lead to the meshlets, and the search of one
+//! is the test of a leaf.
 
 use crate::bvh::compact::{Expanded, MeshletCache, TrianglePlace, with_cache};
 use crate::bvh::layout::wide::{CHILD_ROW, ChildRef, Unit, WIDTH};
 use crate::bvh::query::{HitQuery, TriangleTest};
+use crate::bvh::traverse::leaf_kind::LeafKind;
 use crate::bvh::traverse::single::{
     BOX_SLACK, LeafTest, RaySetup, distances, leaf_slots, traverse, traverse_body,
 };
@@ -13,40 +13,31 @@ use crate::bvh::traverse::tree_view::TreeView;
 use crate::bvh::traverse::triangle_leaf::{AnyLeaf, ClosestLeaf, ClosestTri};
 use crate::ray::Ray;
 use crate::stats::{Counter, count};
-pub(crate) use blocks::trace_blocks;
 use fearless_simd::{Simd, SimdBase, SimdMask, f32x8};
+use std::cell::RefCell;
 
 /// The leaf test of a compact tree: the small tree of a meshlet, and the ordinary test `inner` for
 /// its leaves.
-pub(crate) struct Meshlets<'a, L> {
-    pub(crate) cache: &'a mut MeshletCache,
-    pub(crate) key: u64,
-    pub(crate) ray: &'a RaySetup,
+#[derive(Clone, Copy)]
+pub(crate) struct Meshlets<'c, 'r, L> {
+    cache: &'c RefCell<MeshletCache>,
+    key: u64,
+    ray: &'r RaySetup,
     pub(crate) inner: L,
     /// Whether somebody will ask for `place`.
-    pub(crate) keeps_place: bool,
+    keeps_place: bool,
     /// The place of the closest triangle, where this search has found it.
     pub(crate) place: Option<TrianglePlace>,
 }
 
-impl<'a, L> Meshlets<'a, L> {
-    #[inline(always)]
-    pub(crate) fn new(
-        cache: &'a mut MeshletCache,
-        key: u64,
-        ray: &'a RaySetup,
-        inner: L,
-    ) -> Meshlets<'a, L> {
-        Meshlets { cache, key, ray, inner, keeps_place: false, place: None }
-    }
-}
-
-impl<S: Simd, L: LeafTest<S>> LeafTest<S> for Meshlets<'_, L> {
+impl<S: Simd, L: LeafTest<S>> LeafTest<S> for Meshlets<'_, '_, L> {
     type Query = L::Query;
+    const TREES: bool = true;
 
     #[inline(always)]
     fn test(&mut self, simd: S, units: &[Unit], leaf: ChildRef, skip_t: &mut f32) -> bool {
-        let (expanded, words) = self.cache.meshlet(simd, self.key, units, leaf);
+        let mut cache = self.cache.borrow_mut();
+        let (expanded, words) = cache.meshlet(simd, self.key, units, leaf);
         let before = self.inner.closest();
         let over = visit(simd, expanded, words, self.ray, skip_t, &mut self.inner);
         let after = self.inner.closest();
@@ -57,6 +48,50 @@ impl<S: Simd, L: LeafTest<S>> LeafTest<S> for Meshlets<'_, L> {
             self.place = Some(expanded.leaves.place_of(leaf.unit(), id));
         }
         over
+    }
+}
+
+/// Leaves that are meshlets of the tree with this key.
+#[derive(Clone, Copy)]
+pub(crate) struct InMeshlets<'c> {
+    pub(crate) cache: &'c RefCell<MeshletCache>,
+    pub(crate) key: u64,
+    pub(crate) keeps_places: bool,
+}
+
+impl<'c, 'r> LeafKind<'r> for InMeshlets<'c> {
+    const COMPACT: bool = true;
+    type Leaf<S: Simd, L: LeafTest<S> + Copy> = Meshlets<'c, 'r, L>;
+
+    #[inline(always)]
+    fn around<S: Simd, L: LeafTest<S> + Copy>(
+        self,
+        ray: &'r RaySetup,
+        inner: L,
+    ) -> Meshlets<'c, 'r, L> {
+        self.meshlets(ray, inner)
+    }
+
+    #[inline(always)]
+    fn found<S: Simd, L: LeafTest<S> + Copy>(
+        leaf: Meshlets<'c, 'r, L>,
+    ) -> (L, Option<TrianglePlace>) {
+        (leaf.inner, leaf.place)
+    }
+}
+
+impl<'c> InMeshlets<'c> {
+    /// The meshlets of a tree, for rays of which nobody asks where the closest triangle lies.
+    #[inline(always)]
+    fn alone(cache: &'c RefCell<MeshletCache>, tree: &TreeView<'_>) -> Self {
+        InMeshlets { cache, key: tree.meshlets(), keeps_places: false }
+    }
+
+    /// The leaf test of a ray.
+    #[inline(always)]
+    pub(crate) fn meshlets<'r, L>(self, ray: &'r RaySetup, inner: L) -> Meshlets<'c, 'r, L> {
+        let InMeshlets { cache, key, keeps_places: keeps_place } = self;
+        Meshlets { cache, key, ray, inner, keeps_place, place: None }
     }
 }
 
@@ -141,7 +176,7 @@ pub(crate) fn search<S: Simd, L: LeafTest<S>>(
     inner: L,
 ) -> L {
     with_cache(|cache| {
-        let mut leaves = Meshlets::new(cache, tree.meshlets(), ray, inner);
+        let mut leaves = InMeshlets::alone(cache, tree).meshlets(ray, inner);
         traverse(simd, tree, ray, t_max, &mut leaves);
         leaves.inner
     })
@@ -160,8 +195,7 @@ pub(crate) fn closest<S: Simd, T: TriangleTest>(
             || {
                 let setup = RaySetup::new(ray);
                 let inner = ClosestLeaf::<T>::new(&setup, ray.t_max);
-                let key = tree.meshlets();
-                let mut leaves = Meshlets::new(cache, key, &setup, inner);
+                let mut leaves = InMeshlets::alone(cache, tree).meshlets(&setup, inner);
                 traverse_body(simd, tree, &setup, ray.t_max, &mut leaves);
                 leaves.inner.best
             },
@@ -178,8 +212,7 @@ pub(crate) fn occluded<S: Simd, T: TriangleTest>(simd: S, tree: &TreeView<'_>, r
             || {
                 let setup = RaySetup::new(ray);
                 let inner = AnyLeaf::<T>::new(&setup, ray.t_max);
-                let key = tree.meshlets();
-                let mut leaves = Meshlets::new(cache, key, &setup, inner);
+                let mut leaves = InMeshlets::alone(cache, tree).meshlets(&setup, inner);
                 traverse_body(simd, tree, &setup, ray.t_max, &mut leaves);
                 leaves.inner.found
             },
