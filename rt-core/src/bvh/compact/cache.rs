@@ -2,6 +2,7 @@
 
 use super::expand::Expanded;
 use crate::bvh::layout::wide::{ChildRef, Unit};
+use crate::simd::prefetch;
 use fearless_simd::Simd;
 use std::cell::{Cell, RefCell};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -49,6 +50,8 @@ impl MeshletCache {
         if *held != (key, unit as u32) {
             // Should a panic leave it half done, the place must not count as filled.
             *held = (0, 0);
+            // Traversals request the first four lines. Leaves are read after the nodes.
+            prefetch::<8, _>(units, unit + 8);
             expanded.load(simd, words);
             *held = (key, unit as u32);
         }

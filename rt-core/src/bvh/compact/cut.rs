@@ -1,10 +1,9 @@
 //! Cuts the tree of a piece of a mesh into parts that become meshlets.
 
 use crate::bvh::layout::id_leaf::leaf_primitive_ids;
-use crate::bvh::layout::wide::{
-    CHILD_ROW, ChildRef, LEAF_SIZE, NODE_UNITS, WIDTH, WideBvh, get_box,
-};
+use crate::bvh::layout::wide::{CHILD_ROW, ChildRef, LEAF_SIZE, NODE_UNITS, WideBvh, get_box};
 use crate::math::Aabb;
+use rayon::prelude::*;
 
 /// Most triangles of a meshlet.
 pub(super) const MAX_TRIANGLES: usize = 64;
@@ -51,33 +50,49 @@ impl Part {
     }
 }
 
-/// The parts of a tree whose leaves hold triangle numbers.
+/// Levels of a tree whose subtrees are cut in parallel.
+const PARALLEL_LEVELS: usize = 3;
+
+/// The parts of a tree whose leaves hold triangle numbers. The same for any number of threads.
 pub(super) fn parts(tree: &WideBvh) -> Vec<Part> {
     let mut finished = Vec::new();
-    let rest = parts_below(tree, 0, &mut finished);
+    let rest = parts_below(tree, 0, 0, &mut finished);
     finished.extend(rest);
     finished
 }
 
-/// Cuts the subtree of a node. Returns the parts that may still grow: a single one when the subtree
-/// fits a meshlet, or small ones.
-fn parts_below(tree: &WideBvh, at: usize, finished: &mut Vec<Part>) -> Vec<Part> {
+/// Cuts the subtree of a node on a level. Returns the parts that may still grow: a single one when
+/// the subtree fits a meshlet, or small ones.
+fn parts_below(tree: &WideBvh, at: usize, level: usize, finished: &mut Vec<Part>) -> Vec<Part> {
     let node = &tree.units[at..at + NODE_UNITS];
+    let refs = node[CHILD_ROW].bits();
+    let count = refs.iter().take_while(|&&child| ChildRef(child) != ChildRef::NONE).count();
+    let below = |slot: usize, open: &mut Vec<Part>, finished: &mut Vec<Part>| {
+        let child = ChildRef(refs[slot]);
+        if !child.is_leaf() {
+            open.extend(parts_below(tree, child.unit(), level + 1, finished));
+            return;
+        }
+        let ids = leaf_primitive_ids(&tree.units, child);
+        let mut prims = [0; LEAF_SIZE];
+        prims[..ids.len()].copy_from_slice(ids);
+        let bounds = get_box(node, slot);
+        open.push(Part::of(vec![Leaf { bounds, prims, count: ids.len() }]));
+    };
     let mut open: Vec<Part> = Vec::new();
-    for slot in 0..WIDTH {
-        let child = ChildRef(node[CHILD_ROW].bits()[slot]);
-        if child == ChildRef::NONE {
-            break;
+    if level < PARALLEL_LEVELS {
+        let cut = |slot| {
+            let (mut open, mut finished) = (Vec::new(), Vec::new());
+            below(slot, &mut open, &mut finished);
+            (open, finished)
+        };
+        let cut: Vec<_> = (0..count).into_par_iter().map(cut).collect();
+        for (parts, ended) in cut {
+            open.extend(parts);
+            finished.extend(ended);
         }
-        if child.is_leaf() {
-            let ids = leaf_primitive_ids(&tree.units, child);
-            let mut prims = [0; LEAF_SIZE];
-            prims[..ids.len()].copy_from_slice(ids);
-            let bounds = get_box(node, slot);
-            open.push(Part::of(vec![Leaf { bounds, prims, count: ids.len() }]));
-        } else {
-            open.extend(parts_below(tree, child.unit(), finished));
-        }
+    } else {
+        (0..count).for_each(|slot| below(slot, &mut open, finished));
     }
     join(&mut open);
     if open.len() > 1 {
