@@ -48,8 +48,8 @@ enum Command {
     Quote,
     /// Renders a file: meshes, isosurfaces of image data, lines as tubes, points as spheres
     Render(RenderArgs),
-    /// Writes the triangles of a file, without colours, scalars and normals, to one that `bench
-    /// render` draws without reading all of it
+    /// Writes a mesh, with its normals, its colours and the values of an array, or a volume to a
+    /// file that `bench render` draws without reading all of it
     #[command(after_help = store::EXAMPLES)]
     Store(StoreArgs),
     /// Renders one of the report's images of generated data
@@ -74,7 +74,7 @@ struct RunArgs {
     #[arg(long)]
     quick: bool,
     /// The dissertation's own sizes: fig3.6, table4.1, fig4.7, fig4.9, stored-files, memory-limit.
-    /// Each takes up to three quarters of an hour, stored-files up to 25 GB on disk, asked for
+    /// Each takes up to an hour, stored-files up to 25 GB on disk, asked for
     /// first; its files are kept in the cache (RTSV_CACHE) for the next run
     #[arg(long, conflicts_with = "quick")]
     thesis: bool,
