@@ -31,7 +31,8 @@ const BUFFER: usize = 64 << 20;
 
 #[test]
 fn compact_storage_keeps_sixteen_bytes_per_triangle_and_builds_in_little_more() {
-    // The second has many pieces. An array of the tree that grew was copied, and so in memory twice.
+    // The second has many pieces. An array of units that grew was copied: the tree was in memory
+    // twice.
     for cells in [1000, 2200] {
         measure(&sheet(cells));
     }

@@ -49,8 +49,8 @@ struct Entry {
 }
 
 /// Traces the rays of a block through a triangle hierarchy and writes the results into `hits` (for
-/// occlusion, `prim` is 0 where something blocks the ray). `places` gets where the closest triangles
-/// lie, in trees that keep it.
+/// occlusion, `prim` is 0 where something blocks the ray). `places` gets where the closest
+/// triangles lie, in trees that keep it.
 #[inline(always)]
 pub(super) fn trace<S, T, Q, K>(
     simd: S,
