@@ -505,13 +505,20 @@ pub fn run(experiment: &Experiment, context: &mut Context<'_>) -> anyhow::Result
 
 /// How to measure the rest of an experiment that was interrupted.
 fn continuation(context: &Context<'_>, id: &str) -> String {
-    let thesis = if context.thesis { " --thesis" } else { "" };
+    let size = match (context.quick, context.thesis) {
+        (true, _) => " --quick",
+        (_, true) => " --thesis",
+        _ => "",
+    };
     match &context.checkpoint {
         Some(c) if !c.names().is_empty() => {
             let names = c.names().join(", ");
-            format!("`bench run {id}{thesis} --resume` measures the rest (kept: {names})")
+            format!(
+                "`bench run {id}{size} --resume`, with --out and --record as before, measures the \
+                 rest (kept: {names})"
+            )
         }
-        _ => format!("`bench run {id}{thesis}` measures it all"),
+        _ => format!("`bench run {id}{size}` measures it all"),
     }
 }
 
