@@ -28,11 +28,11 @@ const PARTS_PER_TASK: usize = 128;
 /// Of so many pieces, one is encoded first, to know how much room all of them need. An array of
 /// units that grows is copied, as its alignment is more than allocators move: the tree would be in
 /// memory twice, and 259 million triangles took 40.9 bytes each at the height for 18.6 in the end.
-const SAMPLED: usize = 16;
+const SAMPLE_STRIDE: usize = 16;
 /// With fewer pieces, a copy takes less than the builder of one.
 const FEWEST_TO_SAMPLE: usize = 16;
 /// Room by that of the sample: pieces differ.
-const MORE: f64 = 1.03;
+const ROOM_FACTOR: f64 = 1.03;
 
 /// Leaves of the nodes above: meshlets, which lie elsewhere in the array.
 struct MeshletRefs<'m>(&'m [(Aabb, usize)]);
@@ -91,14 +91,14 @@ impl CompactBvh {
         };
         let mut sample = Vec::new();
         if pieces.len() >= FEWEST_TO_SAMPLE {
-            for piece in pieces.iter().step_by(SAMPLED) {
+            for piece in pieces.iter().step_by(SAMPLE_STRIDE) {
                 sample.push(encode(piece)?);
             }
             units.reserve_exact(room_for_all(&sample, &pieces));
         }
         let mut sample = sample.into_iter();
         for (i, piece) in pieces.iter().enumerate() {
-            let sampled = if i % SAMPLED == 0 { sample.next() } else { None };
+            let sampled = if i % SAMPLE_STRIDE == 0 { sample.next() } else { None };
             let meshlets = sampled.map_or_else(|| encode(piece), Ok)?;
             append(meshlets, &mut units, &mut placed);
         }
@@ -128,8 +128,8 @@ impl CompactBvh {
                 }
             }
         }
-        // To give back little is not worth a copy.
-        if units.capacity() - units.len() > units.len() / 16 {
+        // The copy of a large tree would be the height of its build: it keeps a little room.
+        if ends.len() < FEWEST_TO_SAMPLE || units.capacity() - units.len() > units.len() / 16 {
             units.shrink_to_fit();
         }
         let bvh = WideBvh { units, bounds: above.bounds, depth: above.depth };
@@ -166,14 +166,14 @@ fn encode_piece(
 
 /// Units for all pieces and for the nodes above their meshlets, by those of a sample.
 fn room_for_all(sample: &[Vec<Meshlets>], pieces: &[&[u32]]) -> usize {
-    let sampled: usize = pieces.iter().step_by(SAMPLED).map(|piece| piece.len()).sum();
+    let sampled: usize = pieces.iter().step_by(SAMPLE_STRIDE).map(|piece| piece.len()).sum();
     let all: usize = pieces.iter().map(|piece| piece.len()).sum();
     let tasks = || sample.iter().flatten();
     let units: usize = tasks().map(|task| task.units.len()).sum();
     let meshlets: usize = tasks().map(|task| task.placed.len()).sum();
     // A node above has six children, more or less.
     let units = (units + NODE_UNITS * meshlets / 6) as f64;
-    (MORE * units * all as f64 / sampled.max(1) as f64) as usize
+    (ROOM_FACTOR * units * all as f64 / sampled.max(1) as f64) as usize
 }
 
 /// Appends the meshlets of all tasks.

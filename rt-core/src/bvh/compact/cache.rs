@@ -7,7 +7,7 @@ use fearless_simd::Simd;
 use std::cell::{Cell, RefCell};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Expanded meshlets per thread, as a power of two: 1.4 MiB, of which mostly a part is in use.
+/// Expanded meshlets per thread, as a power of two: 2.3 MiB, of which mostly a part is in use.
 const SLOTS_LOG2: u32 = 8;
 
 /// A key that no tree of this process has had.
