@@ -68,7 +68,7 @@ impl<'w> Search<'w> {
                     let (nodes, leaves) =
                         dispatch!(level, simd => expanded.with_all_nodes(simd, words));
                     search.visit(nodes, local, scale2, |search, leaf| {
-                        let units = dispatch!(level, simd => leaves.with(simd, words, leaf));
+                        let units = dispatch!(level, simd => leaves.with_named(simd, words, leaf));
                         search.test_leaf(units, leaf, entry, &render_from_local);
                     });
                 });

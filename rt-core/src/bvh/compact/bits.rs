@@ -25,6 +25,22 @@ pub(super) fn read_64(words: &[u32], at: usize) -> u64 {
     low >> shift | u64::from(three[2]) << 1 << (63 - shift)
 }
 
+/// Bits that [`read_57`] has at least.
+pub(super) const SHORT_READ: u32 = 57;
+
+/// At least 57 bits from bit `at` on, below others. Needs two words after the one where they start.
+/// One load, where [`read_64`] needs three.
+#[inline(always)]
+pub(super) fn read_57(words: &[u32], at: usize) -> u64 {
+    if cfg!(target_endian = "big") {
+        return read_64(words, at);
+    }
+    let bytes: &[u8] = bytemuck::cast_slice(words);
+    let first = at >> 3;
+    let eight: [u8; 8] = bytes[first..first + 8].try_into().expect("a slice of that length");
+    u64::from_le_bytes(eight) >> (at & 7)
+}
+
 /// Bits needed for numbers up to `largest`.
 pub(crate) fn width(largest: u32) -> u32 {
     32 - largest.leading_zeros()
@@ -75,6 +91,8 @@ mod tests {
                 bits | u64::from(words[(at + i) / 32] >> ((at + i) % 32) & 1) << i
             });
             assert_eq!(read_64(&words, at), expected, "from bit {at}");
+            let short = read_57(&words, at) ^ expected;
+            assert_eq!(short << (64 - SHORT_READ), 0, "from bit {at}");
         }
     }
 

@@ -9,6 +9,7 @@ use super::CompactBvh;
 use super::cache::new_key;
 use super::cut::{Part, parts};
 use super::meshlet::{Encoder, one_to_a_leaf};
+use super::nodes::PLANE_WORDS;
 use super::pieces::{PIECE, Pieces, divide};
 use crate::bvh::build::{PrimRef, Progress, Stopped, build_wide};
 use crate::bvh::layout::id_leaf::IdWriter;
@@ -33,6 +34,9 @@ const SAMPLE_STRIDE: usize = 16;
 const FEWEST_TO_SAMPLE: usize = 16;
 /// Room by that of the sample: pieces differ.
 const ROOM_FACTOR: f64 = 1.03;
+
+/// Units behind a meshlet that has no node behind it.
+const UNITS_BEHIND: usize = (4 * PLANE_WORDS).div_ceil(size_of::<Unit>());
 
 /// Leaves of the nodes above: meshlets, which lie elsewhere in the array.
 struct MeshletRefs<'m>(&'m [(Aabb, usize)]);
@@ -127,6 +131,11 @@ impl CompactBvh {
                     *child = reference.moved(moved).0;
                 }
             }
+        }
+        if above.units.len() == NODE_UNITS {
+            // Rays read the last node of a meshlet as if it had eight children.
+            grow(&mut units, UNITS_BEHIND);
+            units.extend([Unit::ZERO; UNITS_BEHIND]);
         }
         // The copy of a large tree would be the height of its build: it keeps a little room.
         if ends.len() < FEWEST_TO_SAMPLE || units.capacity() - units.len() > units.len() / 16 {

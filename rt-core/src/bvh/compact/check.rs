@@ -4,7 +4,9 @@
 use super::bits;
 use super::boxes::EXPONENTS;
 use super::cut::MAX_LEAVES;
+use super::edges::EdgeVertex;
 use super::meshlet::{HEADER_WORDS, Header, MAX_NODES, NODE, NONE};
+use super::nodes::PLANE_WORDS;
 use crate::bvh::layout::wide::{CHILD_ROW, ChildRef, MAX_DEPTH, NODE_UNITS, Unit, WIDTH};
 
 /// Bits of a vertex number in a meshlet of at most 192 vertices.
@@ -61,7 +63,8 @@ fn check_meshlet(words: &[u32]) -> Result<(), &'static str> {
         && header.id_bits <= u32::BITS
         && header.index_bits <= MAX_INDEX_BITS
         && header.lattice.exponents.iter().all(|e| EXPONENTS.contains(e))
-        && header.axes.iter().all(|axis| axis.bits <= u32::BITS);
+        && header.axes.iter().all(|axis| axis.bits <= u32::BITS)
+        && !(header.on_edges && header.axes.iter().any(|axis| axis.entries == 0));
     if !in_range {
         return Err("the header of a meshlet is out of range");
     }
@@ -83,6 +86,14 @@ fn check_meshlet(words: &[u32]) -> Result<(), &'static str> {
     }
     for vertex in 0..header.vertices {
         let mut at = sections.vertices + (vertex * sections.vertex) as usize;
+        if let Some(edge) = sections.edge {
+            let EdgeVertex { axis, planes } = edge.read(bits::read_57(words, at));
+            let planes_of = |a: usize| header.axes[a % 3].entries;
+            if axis > 2 || planes[0] >= planes_of(axis + 1) || planes[1] >= planes_of(axis + 2) {
+                return Err("a vertex lies on an edge that does not exist");
+            }
+            continue;
+        }
         for axis in &header.axes {
             let number = bits::read(words, at, axis.number_bits());
             if axis.entries != 0 && number >= axis.entries {
@@ -97,8 +108,10 @@ fn check_meshlet(words: &[u32]) -> Result<(), &'static str> {
 /// Checks the small tree of a meshlet, and returns the word behind it.
 fn check_nodes(words: &[u32], header: &Header) -> Result<usize, &'static str> {
     let (mut at, mut nodes, mut leaves, mut triangles) = (HEADER_WORDS, 1, 0, 0);
+    let mut last = at;
     for node in 0..header.nodes {
         let Some(&kinds) = words.get(at) else { return Err("the nodes of a meshlet end outside") };
+        last = at;
         let mut count = 0;
         for slot in 0..WIDTH {
             match kinds >> (4 * slot) & 15 {
@@ -121,5 +134,7 @@ fn check_nodes(words: &[u32], header: &Header) -> Result<usize, &'static str> {
     if (nodes, leaves, triangles) != (header.nodes, header.leaves, header.triangles) {
         return Err("the nodes of a meshlet do not agree with its header");
     }
-    if at > words.len() { Err("the nodes of a meshlet end outside") } else { Ok(at) }
+    // Of the last node, rays read as much as eight children have.
+    let end = at.max(last + 1 + PLANE_WORDS);
+    if end > words.len() { Err("the nodes of a meshlet end outside") } else { Ok(at) }
 }

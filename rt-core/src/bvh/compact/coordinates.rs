@@ -5,8 +5,13 @@
 //! integer, and for each vertex what is to be added. On isosurfaces of lattices, and on terrain,
 //! most vertices share coordinates with others; then the different values are stored once, and each
 //! vertex has the number of its value.
+//!
+//! Where two coordinates of each vertex are shared, [`super::edges`] has a shorter coding.
 
 use super::bits::{self, Writer};
+
+/// The coordinates of a meshlet's vertices, axis by axis.
+pub(super) type Values = [Vec<f32>; 3];
 
 /// How one coordinate is coded.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -21,14 +26,14 @@ pub(super) struct Axis {
 
 /// The integer of a float. Zeros of both signs keep their difference.
 #[inline(always)]
-fn ordered(x: f32) -> u32 {
+pub(super) fn ordered(x: f32) -> u32 {
     let b = x.to_bits();
     b ^ (((b as i32 >> 31) as u32) | 1 << 31)
 }
 
 /// The float of an integer.
 #[inline(always)]
-fn float(k: u32) -> f32 {
+pub(super) fn float(k: u32) -> f32 {
     f32::from_bits(k ^ (!(((k as i32) >> 31) as u32) | 1 << 31))
 }
 
@@ -45,7 +50,9 @@ impl Axis {
         let (different, all) = (sorted.len() as u32, values.len() as u32);
         let bits = bits::width(last - base);
         let each_once = different * bits + all * bits::width(different - 1);
-        Axis { base, bits, entries: if each_once < all * bits { different } else { 0 } }
+        // Each costs one more read: not for a few bits.
+        let cheaper = each_once < all * bits / 4 * 3;
+        Axis { base, bits, entries: if cheaper { different } else { 0 } }
     }
 
     /// Bits of the number that a vertex has.
@@ -79,18 +86,15 @@ impl Axis {
 /// One coordinate of a meshlet's vertices, ready to be read.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Coordinates {
-    base: u32,
-    bits: u32,
+    pub(super) base: u32,
+    pub(super) bits: u32,
     entries: u32,
     /// Where the vertices' numbers lie in the bits that are read of a vertex.
     shift: u32,
     mask: u32,
     /// Where the values start that are stored once, in bits.
-    values: usize,
+    pub(super) values: usize,
 }
-
-/// Most values that are stored once: their number has eight bits.
-pub(super) const MAX_VALUES: usize = 256;
 
 impl Coordinates {
     pub(super) const EMPTY: Coordinates =
@@ -106,35 +110,24 @@ impl Coordinates {
         Coordinates { base, bits, entries, shift: shift & 63, mask, values }
     }
 
-    /// Reads the values that are stored once.
+    /// The coordinates of vertices of which these bits were read. Of values that are stored once,
+    /// only those of the vertices are read: a ray sees one or two leaves of most meshlets.
     #[inline(always)]
-    pub(super) fn read_values(&self, words: &[u32], values: &mut [f32; MAX_VALUES]) {
-        let mut at = self.values;
-        for value in values.iter_mut().take(self.entries as usize) {
-            *value = float(self.base.wrapping_add(bits::read(words, at, self.bits)));
-            at += self.bits as usize;
-        }
-    }
-
-    /// The coordinates of vertices of which these bits were read, by the values that are stored
-    /// once.
-    #[inline(always)]
-    pub(super) fn of<const N: usize>(
-        &self,
-        vertices: &[u64; N],
-        values: &[f32; MAX_VALUES],
-    ) -> [f32; N] {
+    pub(super) fn of<const N: usize>(&self, words: &[u32], vertices: &[u64; N]) -> [f32; N] {
         let mut all = [0.0; N];
-        let (base, shift, mask) = (self.base, self.shift, self.mask);
+        let &Coordinates { base, bits, shift, mask, values, .. } = self;
         // No `map`: its closure would be compiled without the caller's instruction set.
+        let mut numbers = [0; N];
+        for (number, vertex) in numbers.iter_mut().zip(vertices) {
+            *number = (vertex >> shift) as u32 & mask;
+        }
         if self.entries != 0 {
-            for (x, vertex) in all.iter_mut().zip(vertices) {
-                *x = values[((vertex >> shift) as u32 & mask) as usize % MAX_VALUES];
+            for number in &mut numbers {
+                *number = bits::read(words, values + (*number * bits) as usize, bits);
             }
-        } else {
-            for (x, vertex) in all.iter_mut().zip(vertices) {
-                *x = float(base.wrapping_add((vertex >> shift) as u32 & mask));
-            }
+        }
+        for (x, number) in all.iter_mut().zip(numbers) {
+            *x = float(base.wrapping_add(number));
         }
         all
     }
@@ -171,11 +164,10 @@ mod tests {
             let numbers = 3 + axis.value_bits() as usize;
             for shift in [0, 7, 32] {
                 let coordinates = Coordinates::new(&axis, 3, shift);
-                let mut once = [0.0; MAX_VALUES];
-                coordinates.read_values(&words, &mut once);
                 for (i, x) in values.iter().enumerate() {
                     let at = numbers + i * axis.number_bits() as usize;
-                    let [back] = coordinates.of(&[bits::read_64(&words, at) << shift], &once);
+                    let vertex = bits::read_64(&words, at) << shift;
+                    let [back] = coordinates.of(&words, &[vertex]);
                     assert_eq!(back.to_bits(), x.to_bits(), "{x} of {values:?}");
                 }
             }

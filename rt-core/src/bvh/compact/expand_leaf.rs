@@ -1,12 +1,11 @@
 //! The leaves of an expanded meshlet.
 
 use super::bits;
-use super::coordinates::MAX_VALUES;
 use super::cut::MAX_LEAVES;
 use super::meshlet::{Header, Sections};
 use super::place::TrianglePlace;
 use crate::bvh::layout::triangles::{TRI_LEAF_UNITS, leaf_floats, leaf_triangle_ids};
-use crate::bvh::layout::wide::{ChildRef, LEAF_SIZE, Unit, WIDTH};
+use crate::bvh::layout::wide::{ChildRef, LEAF_SIZE, Unit};
 use fearless_simd::Simd;
 use glam::Vec3;
 
@@ -19,16 +18,13 @@ pub(crate) struct ExpandedLeaves {
     units: [Unit; LEAVES],
     /// The leaves that are in `units`.
     present: u32,
-    /// First triangle and last triangle of each leaf that an expanded node names; the last place is
-    /// for children that are no leaves.
-    triangles: [[u8; 2]; MAX_LEAVES + 1],
+    /// First triangle and last triangle of each leaf that a ray has reached, or an expanded node
+    /// names.
+    triangles: [[u8; 2]; MAX_LEAVES],
     index_bits: u32,
     id_bits: u32,
     first_id: u32,
     sections: Sections,
-    /// Coordinates that are stored once, when they have been read.
-    values: [[f32; MAX_VALUES]; 3],
-    has_values: bool,
 }
 
 /// A reference to a leaf of an expanded meshlet.
@@ -40,39 +36,65 @@ impl ExpandedLeaves {
     pub(super) const EMPTY: ExpandedLeaves = ExpandedLeaves {
         units: [Unit::ZERO; LEAVES],
         present: 0,
-        triangles: [[0; 2]; MAX_LEAVES + 1],
+        triangles: [[0; 2]; MAX_LEAVES],
         index_bits: 0,
         id_bits: 0,
         first_id: 0,
         sections: Sections::EMPTY,
-        values: [[0.0; MAX_VALUES]; 3],
-        has_values: false,
     };
 
     /// Takes the leaves of a meshlet whose nodes end before word `at`.
     #[inline(always)]
     pub(super) fn load(&mut self, header: &Header, at: usize) {
         self.present = 0;
-        self.has_values = false;
         (self.index_bits, self.id_bits) = (header.index_bits, header.id_bits);
         self.first_id = header.first_id;
         self.sections = header.sections(at);
     }
 
-    /// Notes which triangles a leaf has; [`MAX_LEAVES`] is none.
+    /// Notes which triangles a leaf has.
     #[inline(always)]
     pub(super) fn set_triangles(&mut self, leaf: usize, first: u32, last: u32) {
-        self.triangles[leaf.min(MAX_LEAVES)] = [first as u8, last as u8];
+        self.triangles[leaf.min(MAX_LEAVES - 1)] = [first as u8, last as u8];
     }
 
-    /// The units that hold `leaf`, which is expanded first where it is not. `words` start with the
-    /// meshlet.
+    /// The units that hold `leaf`, which a node that is expanded names. It is expanded first where
+    /// it is not. `words` start with the meshlet.
     #[inline(always)]
-    pub(crate) fn with<S: Simd>(&mut self, simd: S, words: &[u32], leaf: ChildRef) -> &[Unit] {
+    pub(crate) fn with_named<S: Simd>(
+        &mut self,
+        simd: S,
+        words: &[u32],
+        leaf: ChildRef,
+    ) -> &[Unit] {
         let number = leaf.unit() / TRI_LEAF_UNITS;
         if self.present >> number & 1 == 0 {
             self.expand(simd, words, number);
         }
+        &self.units
+    }
+
+    /// A reference to leaf `number` with these triangles, which is expanded first where it is not.
+    #[inline(always)]
+    pub(crate) fn with<S: Simd>(
+        &mut self,
+        simd: S,
+        words: &[u32],
+        number: usize,
+        first: u32,
+        last: u32,
+    ) -> ChildRef {
+        let number = number.min(MAX_LEAVES - 1);
+        if self.present >> number & 1 == 0 {
+            self.set_triangles(number, first, last);
+            self.expand(simd, words, number);
+        }
+        leaf_reference(number)
+    }
+
+    /// The units that hold the expanded leaves.
+    #[inline(always)]
+    pub(crate) fn units(&self) -> &[Unit] {
         &self.units
     }
 
@@ -108,26 +130,10 @@ impl ExpandedLeaves {
             return None;
         }
         let reference = leaf_reference(leaf);
-        let floats = leaf_floats(self.with(simd, words, reference), reference);
+        let floats = leaf_floats(self.with_named(simd, words, reference), reference);
         let at = |corner: usize, axis: usize| floats[4 * (3 * corner + axis) + slot];
         let corner = |k: usize| Vec3::new(at(k, 0), at(k, 1), at(k, 2));
         Some((leaf_triangle_ids(floats)[slot], [corner(0), corner(1), corner(2)]))
-    }
-
-    /// The units with the leaves in `slots` of a row of references.
-    #[inline(always)]
-    pub(crate) fn with_many<S: Simd>(
-        &mut self,
-        simd: S,
-        words: &[u32],
-        refs: &[u32; WIDTH],
-        mut slots: u32,
-    ) -> &[Unit] {
-        while slots != 0 {
-            self.with(simd, words, ChildRef(refs[slots.trailing_zeros() as usize & 7]));
-            slots &= slots - 1;
-        }
-        &self.units
     }
 
     #[inline(never)]
@@ -142,12 +148,6 @@ impl ExpandedLeaves {
     fn expand_body(&mut self, words: &[u32], leaf: usize) {
         // Copies: what is written cannot change them, so they need not be read again.
         let (sections, index_bits, first_id) = (self.sections, self.index_bits, self.first_id);
-        if !self.has_values {
-            for (coordinates, values) in sections.coordinates.iter().zip(&mut self.values) {
-                coordinates.read_values(words, values);
-            }
-            self.has_values = true;
-        }
         let [first, last] = self.triangles[leaf].map(u32::from);
         let units = &mut self.units[TRI_LEAF_UNITS * leaf..][..TRI_LEAF_UNITS];
         let floats: &mut [f32] = bytemuck::cast_slice_mut(units);
@@ -161,7 +161,7 @@ impl ExpandedLeaves {
         for slot in 0..LEAF_SIZE {
             let number = (first + slot as u32).min(last);
             let triangle =
-                bits::read_64(words, sections.triangles + (number * sections.triangle) as usize);
+                bits::read_57(words, sections.triangles + (number * sections.triangle) as usize);
             for corner in 0..3 {
                 let vertex = (triangle >> (corner as u32 * index_bits)) as u32 & vertex_mask;
                 starts[LEAF_SIZE * corner + slot] =
@@ -173,8 +173,14 @@ impl ExpandedLeaves {
 
         // ---- Corners: one read each, where 64 bits suffice.
         let mut vertices = [0; CORNERS];
-        for (vertex, at) in vertices.iter_mut().zip(starts) {
-            *vertex = bits::read_64(words, at);
+        if sections.vertex <= bits::SHORT_READ {
+            for (vertex, at) in vertices.iter_mut().zip(starts) {
+                *vertex = bits::read_57(words, at);
+            }
+        } else {
+            for (vertex, at) in vertices.iter_mut().zip(starts) {
+                *vertex = bits::read_64(words, at);
+            }
         }
         for axis in 0..3 {
             if axis == 2 && !sections.one_read() {
@@ -182,7 +188,11 @@ impl ExpandedLeaves {
                     *vertex = bits::read_64(words, at + sections.before_z as usize);
                 }
             }
-            let row = sections.coordinates[axis].of(&vertices, &self.values[axis]);
+            let coordinates = &sections.coordinates[axis];
+            let row = match sections.edge {
+                Some(edge) => edge.coordinates(words, &vertices, axis, coordinates),
+                None => coordinates.of(words, &vertices),
+            };
             for corner in 0..3 {
                 floats[4 * (3 * corner + axis)..][..LEAF_SIZE]
                     .copy_from_slice(&row[LEAF_SIZE * corner..][..LEAF_SIZE]);

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! word 0      triangles − 1 (6 bits), vertices − 1 (8), nodes − 1 (4), leaves − 1 (5),
-//!             bits of a triangle number (6)
+//!             bits of a triangle number (6), whether vertices lie on edges (1)
 //! word 1      the lowest triangle number
 //! word 2      exponents of the boxes' lattice + 127 (8 bits each), bits of a vertex number (4)
 //! words 3–5   origin of the lattice
@@ -11,19 +11,23 @@
 //! word 10     different coordinates, when each is stored once (8 each)
 //! then        the nodes: kinds of the children (4 bits each), planes (a byte each)
 //! then        without gaps: of each triangle, three vertex numbers and its number;
-//!             the x, y and z that are stored once; of each vertex, x, y and z or their numbers
+//!             the x, y and z that are stored once; of each vertex, x, y and z or their numbers,
+//!             or, on an edge, its axis (2 bits), its coordinate there, and two numbers
 //! ```
 //!
 //! What belongs to one triangle, or to one vertex, lies together, so that one read has all of it:
-//! with each coordinate by itself, a leaf took 36 reads for its corners in place of 12.
+//! with each coordinate by itself, a leaf took 36 reads for its corners in place of 12. Vertices
+//! are in the order of their first use, and so those of a leaf lie together too. Every meshlet is
+//! followed by others, by nodes or by zeros, because readers take more than they need.
 //!
 //! Nodes are in the order in which the nodes before them name them, and so are leaves and their
 //! triangles: neither needs a reference.
 
 use super::bits::{self, Writer};
 use super::boxes::Lattice;
-use super::coordinates::{Axis, Coordinates};
+use super::coordinates::{Axis, Coordinates, Values};
 use super::cut::Part;
+use super::edges::{EdgeBits, EdgeCoder};
 use crate::bvh::build::{BuilderConfig, LeafCapacity, PrimRef, UNWATCHED, build_wide};
 use crate::bvh::layout::triangles::TriWriter;
 use crate::bvh::layout::wide::{
@@ -57,6 +61,8 @@ pub(super) struct Header {
     pub(super) index_bits: u32,
     pub(super) lattice: Lattice,
     pub(super) axes: [Axis; 3],
+    /// Whether the vertices are coded as [`super::edges`] says.
+    pub(super) on_edges: bool,
 }
 
 impl Header {
@@ -68,7 +74,8 @@ impl Header {
             | (self.vertices - 1) << 6
             | (self.nodes - 1) << 14
             | (self.leaves - 1) << 18
-            | self.id_bits << 23;
+            | self.id_bits << 23
+            | u32::from(self.on_edges) << 29;
         let exponents =
             self.lattice.exponents.iter().rev().fold(0, |word, e| word << 8 | (e + 127) as u32);
         let [ox, oy, oz] = self.lattice.origin.map(f32::to_bits);
@@ -100,6 +107,7 @@ impl Header {
                 exponents: [exponent(0), exponent(1), exponent(2)],
             },
             axes: [axis(0), axis(1), axis(2)],
+            on_edges: words[0] >> 29 & 1 == 1,
         }
     }
 }
@@ -116,6 +124,8 @@ pub(super) struct Sections {
     /// Bits of a vertex before its z. A read of 64 bits has z too, or starts there.
     pub(super) before_z: u32,
     pub(super) coordinates: [Coordinates; 3],
+    /// For vertices on edges.
+    pub(super) edge: Option<EdgeBits>,
     pub(super) end: usize,
 }
 
@@ -127,6 +137,7 @@ impl Sections {
         vertex: 0,
         before_z: 0,
         coordinates: [Coordinates::EMPTY; 3],
+        edge: None,
         end: 0,
     };
 
@@ -149,7 +160,8 @@ impl Header {
         let of_z = of_y + y.value_bits() as usize;
         let vertices = of_z + z.value_bits() as usize;
         let before_z = x.number_bits() + y.number_bits();
-        let vertex = before_z + z.number_bits();
+        let edge = self.on_edges.then(|| EdgeBits::new(&self.axes));
+        let vertex = edge.map_or(before_z + z.number_bits(), EdgeBits::vertex);
         let shift_of_z = if vertex <= u64::BITS { before_z } else { 0 };
         Sections {
             triangles,
@@ -162,6 +174,7 @@ impl Header {
                 Coordinates::new(y, of_y, x.number_bits()),
                 Coordinates::new(z, of_z, shift_of_z),
             ],
+            edge,
             end: vertices + (self.vertices * vertex) as usize,
         }
     }
@@ -195,7 +208,9 @@ pub(super) struct Encoder {
     sorted: Vec<u32>,
     corners: Vec<([u32; 3], u32)>,
     vertex_of_corner: Vec<u32>,
-    values: [Vec<f32>; 3],
+    first_use: Vec<u32>,
+    values: Values,
+    edges: EdgeCoder,
 }
 
 impl Encoder {
@@ -242,16 +257,21 @@ impl Encoder {
         self.corners.extend(corners.zip(0..));
         self.vertex_of_corner.resize(self.corners.len(), 0);
         self.corners.sort_unstable();
-        self.values.iter_mut().for_each(Vec::clear);
-        let mut last = None;
-        for &(bits, corner) in &self.corners {
-            if last != Some(bits) {
-                last = Some(bits);
-                for (values, bits) in self.values.iter_mut().zip(bits) {
-                    values.push(f32::from_bits(bits));
-                }
+        // In the order of their first use, so that those of a leaf lie together.
+        let same = |a: &([u32; 3], u32), b: &([u32; 3], u32)| a.0 == b.0;
+        self.first_use.clear();
+        self.first_use.extend(self.corners.chunk_by(same).map(|corners| corners[0].1));
+        self.first_use.sort_unstable();
+        self.values.iter_mut().for_each(|values| values.resize(self.first_use.len(), 0.0));
+        for corners in self.corners.chunk_by(same) {
+            let (bits, first) = corners[0];
+            let vertex = self.first_use.partition_point(|&corner| corner < first);
+            for (values, bits) in self.values.iter_mut().zip(bits) {
+                values[vertex] = f32::from_bits(bits);
             }
-            self.vertex_of_corner[corner as usize] = self.values[0].len() as u32 - 1;
+            for &(_, corner) in corners {
+                self.vertex_of_corner[corner as usize] = vertex as u32;
+            }
         }
         let vertices = self.values[0].len() as u32;
         let index_bits = bits::width(vertices - 1);
@@ -267,7 +287,14 @@ impl Encoder {
             sorted[a].clone_from(&self.sorted);
             axis
         });
+        let coded = |axis: &Axis| axis.value_bits() + vertices * axis.number_bits();
+        // It costs more to read: not for a few bits.
+        let most = axes.iter().map(coded).sum::<u32>() / 8 * 7;
+        let different = sorted.iter().map(Vec::len).sum();
+        let on_edges = self.edges.choose(&self.values, different, most);
+        let axes = on_edges.unwrap_or(axes);
         let header = Header {
+            on_edges: on_edges.is_some(),
             triangles: ids.len() as u32,
             vertices,
             nodes: (tree.units.len() / NODE_UNITS) as u32,
@@ -285,15 +312,20 @@ impl Encoder {
             corners.iter().for_each(|&vertex| out.push(vertex, index_bits));
             out.push(id - first_id, id_bits);
         }
-        axes.iter().zip(&sorted).for_each(|(axis, sorted)| axis.write_values(sorted, &mut out));
-        for vertex in 0..vertices as usize {
-            for ((axis, values), sorted) in axes.iter().zip(&self.values).zip(&sorted) {
-                out.push(axis.number(values[vertex], sorted), axis.number_bits());
+        let once = if header.on_edges { self.edges.planes() } else { &sorted };
+        axes.iter().zip(once).for_each(|(axis, once)| axis.write_values(once, &mut out));
+        if header.on_edges {
+            self.edges.write(&axes, &self.values, &mut out);
+        } else {
+            for vertex in 0..vertices as usize {
+                for ((axis, values), sorted) in axes.iter().zip(&self.values).zip(&sorted) {
+                    out.push(axis.number(values[vertex], sorted), axis.number_bits());
+                }
             }
         }
         out.finish();
-        // Readers take 64 bits at a time.
-        words.push(0);
+        // Readers take 64 bits at a time, but something follows every meshlet.
+        words.pop();
         words
     }
 }

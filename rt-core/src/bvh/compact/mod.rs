@@ -10,9 +10,9 @@
 //! ([`coordinates`]), and boxes are rounded outwards. Box tests never decide an answer, so larger
 //! boxes change the work alone.
 //!
-//! A ray that reaches a meshlet does not read it in this form: the calling thread [expands][cache]
-//! each node and each leaf, when a ray first reaches it, to the layout of the ordinary tree, and
-//! keeps the last few meshlets. So every kind of query uses its ordinary leaf test.
+//! A ray tests the boxes of a meshlet's [nodes] as they are stored. Of the triangles, the calling
+//! thread [expands][cache] each leaf that a ray reaches to the layout of the ordinary tree, and
+//! keeps those of the last few meshlets. So every kind of query uses its ordinary leaf test.
 //!
 //! A sheet without any lattice takes 14.2 bytes per triangle (the test `compact_memory`), an
 //! isosurface on a lattice 13.6 (the example `storage`).
@@ -24,17 +24,19 @@ mod cache;
 mod check;
 mod coordinates;
 mod cut;
+mod edges;
 mod expand;
 mod expand_leaf;
 mod meshlet;
+mod nodes;
 mod pieces;
 mod place;
 
 use super::layout::wide::WideBvh;
-pub(crate) use cache::{MeshletCache, new_key, with_cache};
+pub(crate) use cache::{MeshletCache, SearchRoom, new_key, with_cache};
 pub(crate) use check::check_units;
-pub(crate) use expand::Expanded;
 pub(crate) use expand_leaf::ExpandedLeaves;
+pub(crate) use nodes::Nodes;
 pub(crate) use pieces::{BYTES_WHILE_DIVIDED, Pieces, divide};
 pub(crate) use place::TrianglePlace;
 

@@ -1,17 +1,16 @@
 //! Rays through a compact tree: the ordinary traversals lead to the meshlets, and the search of one
 //! is the test of a leaf.
 
-use crate::bvh::compact::{Expanded, MeshletCache, TrianglePlace, with_cache};
-use crate::bvh::layout::wide::{CHILD_ROW, ChildRef, Unit, WIDTH};
+use crate::bvh::compact::{MeshletCache, Nodes, SearchRoom, TrianglePlace, with_cache};
+use crate::bvh::layout::wide::{ChildRef, Unit, WIDTH};
 use crate::bvh::query::{HitQuery, TriangleTest};
 use crate::bvh::traverse::leaf_kind::LeafKind;
-use crate::bvh::traverse::single::{
-    BOX_SLACK, LeafTest, RaySetup, distances, leaf_slots, traverse, traverse_body,
-};
+use crate::bvh::traverse::single::{BOX_SLACK, LeafTest, RaySetup, traverse, traverse_body};
 use crate::bvh::traverse::three;
 use crate::bvh::traverse::tree_view::TreeView;
 use crate::bvh::traverse::triangle_leaf::{AnyLeaf, ClosestLeaf, ClosestTri};
 use crate::ray::Ray;
+use crate::simd::prefetch;
 use crate::stats::{Counter, count};
 use fearless_simd::{Simd, SimdBase, SimdMask, f32x8};
 use std::cell::RefCell;
@@ -37,14 +36,16 @@ impl<S: Simd, L: LeafTest<S>> LeafTest<S> for Meshlets<'_, '_, L> {
     #[inline(always)]
     fn test(&mut self, simd: S, units: &[Unit], leaf: ChildRef, skip_t: &mut f32) -> bool {
         let mut cache = self.cache.borrow_mut();
-        let (expanded, words) = cache.meshlet(simd, self.key, units, leaf);
+        let cache = &mut *cache;
         let before = self.inner.closest();
-        let over = visit(simd, expanded, words, self.ray, skip_t, &mut self.inner);
+        let meshlet = (self.key, units, leaf);
+        let over = visit(simd, cache, meshlet, self.ray, skip_t, &mut self.inner);
         let after = self.inner.closest();
         if self.keeps_place
             && after != before
             && let Some(id) = after
         {
+            let (expanded, _) = cache.meshlet(simd, self.key, units, leaf);
             self.place = Some(expanded.leaves.place_of(leaf.unit(), id));
         }
         over
@@ -95,41 +96,64 @@ impl<'c> InMeshlets<'c> {
     }
 }
 
-/// A ray through the small tree of a meshlet. As [`traverse`], whose results must not differ.
+/// A ray through the small tree of a meshlet: a leaf of the tree with this key. As [`traverse`],
+/// whose results must not differ.
 #[inline(always)]
 fn visit<S: Simd, L: LeafTest<S>>(
     simd: S,
-    expanded: &mut Expanded,
-    words: &[u32],
+    cache: &mut MeshletCache,
+    (key, units, meshlet): (u64, &[Unit], ChildRef),
     ray: &RaySetup,
     skip_t: &mut f32,
     inner: &mut L,
 ) -> bool {
-    let (nodes, leaves) = expanded.parts();
+    let words = bytemuck::cast_slice(&units[meshlet.unit()..]);
+    let MeshletCache { last, search: SearchRoom { starts, stack } } = cache;
+    let mut nodes = Nodes::new(words, starts);
+    let (first_plane, step) = nodes.lattice();
     let origin: [f32x8<S>; 3] = three!(|a| f32x8::splat(simd, ray.origin[a]));
     let rcp: [f32x8<S>; 3] = three!(|a| f32x8::splat(simd, ray.rcp[a]));
     let t_min = f32x8::splat(simd, ray.t_min);
     let slack = f32x8::splat(simd, BOX_SLACK);
-    // The distance in the high half, as in the ordinary tree. No more than the nodes.
-    let mut stack = [0u64; 16];
     let (mut len, mut at) = (0, 0);
     loop {
         count(Counter::Nodes, 1);
-        let node = nodes.with(simd, words, at, leaves);
-        let [x, y, z]: [f32x8<S>; 3] =
-            three!(|a| distances(simd, node, ray.near[a], origin[a], rcp[a]));
+        let node = nodes.node(at);
+        let [x, y, z]: [f32x8<S>; 3] = three!(|a| {
+            (node.planes(simd, ray.near[a], first_plane[a], step[a]) - origin[a]) * rcp[a]
+        });
         let near = x.max(y).max(z.max(t_min));
-        let [x, y, z]: [f32x8<S>; 3] =
-            three!(|a| distances(simd, node, ray.near[a] ^ 1, origin[a], rcp[a]));
+        let [x, y, z]: [f32x8<S>; 3] = three!(|a| {
+            (node.planes(simd, ray.near[a] ^ 1, first_plane[a], step[a]) - origin[a]) * rcp[a]
+        });
         let far = x.min(y).min(z) * slack;
         let hit = near.simd_le(far.min(f32x8::splat(simd, *skip_t))).to_bitmask() as u32;
-        let refs = node[CHILD_ROW].bits();
-        let now = hit & leaf_slots(simd, refs);
+        let hit = hit & node.slots();
+        if at == 0 && hit != 0 {
+            // Traversals request the first four lines. Leaves are read after the nodes.
+            prefetch::<8, _>(units, meshlet.unit() + 8);
+        }
+        let now = hit & node.leaf_slots();
         if now != 0 {
             count(Counter::Leaves, now.count_ones() as u64);
-            let units = leaves.with_many(simd, words, refs, now);
-            if inner.test_many(simd, units, refs, now, skip_t) {
-                return true;
+            let (expanded, _) = last.meshlet(simd, key, units, meshlet);
+            // Two at a time, as the test has them: the next may not be needed.
+            let mut rest = now;
+            while rest != 0 {
+                let (mut refs, mut two) = ([0; WIDTH], 0);
+                for _ in 0..2 {
+                    let slot = rest.trailing_zeros() as usize & 7;
+                    let (leaf, first, last) = node.leaf_in(slot);
+                    refs[slot] = expanded.leaves.with(simd, words, leaf, first, last).0;
+                    two |= 1 << slot;
+                    rest &= rest - 1;
+                    if rest == 0 {
+                        break;
+                    }
+                }
+                if inner.test_many(simd, expanded.leaves.units(), &refs, two, skip_t) {
+                    return true;
+                }
             }
         }
         let mut rest = hit & !now;
@@ -139,7 +163,7 @@ fn visit<S: Simd, L: LeafTest<S>>(
             while rest != 0 {
                 let slot = rest.trailing_zeros() as usize & 7;
                 rest &= rest - 1;
-                let entry = u64::from(near[slot].to_bits()) << 32 | u64::from(refs[slot]);
+                let entry = u64::from(near[slot].to_bits()) << 32 | node.node_in(slot) as u64;
                 // Farthest first, so that the nearest is on top.
                 let mut place = len & 15;
                 while !<L::Query as HitQuery>::ANY
@@ -160,7 +184,7 @@ fn visit<S: Simd, L: LeafTest<S>>(
             len -= 1;
             let entry = stack[len & 15];
             if f32::from_bits((entry >> 32) as u32) <= *skip_t {
-                at = ChildRef(entry as u32).unit();
+                at = entry as u32 as usize;
                 break;
             }
         }

@@ -73,7 +73,7 @@ impl CompactBvh {
             }
             stats.leaves += 1;
             stats.primitives += child.count();
-            let units = dispatch!(level, simd => leaves.with(simd, words, child));
+            let units = dispatch!(level, simd => leaves.with_named(simd, words, child));
             let ids = leaf_triangle_ids(leaf_floats(units, child));
             mark(&ids[..child.count()])?;
             for slot in 0..child.count() {
