@@ -75,6 +75,7 @@ impl ExpandedLeaves {
     }
 
     /// A reference to leaf `number` with these triangles, which is expanded first where it is not.
+    /// It has their count: whoever asks for all hits must not get the last triangle four times.
     #[inline(always)]
     pub(crate) fn with<S: Simd>(
         &mut self,
@@ -89,7 +90,7 @@ impl ExpandedLeaves {
             self.set_triangles(number, first, last);
             self.expand(simd, words, number);
         }
-        leaf_reference(number)
+        ChildRef::leaf(TRI_LEAF_UNITS * number, (last - first) as usize + 1)
     }
 
     /// The units that hold the expanded leaves.
