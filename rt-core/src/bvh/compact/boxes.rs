@@ -1,8 +1,9 @@
 //! Boxes with 8 bits per plane, never smaller than the box that they stand for.
 //!
-//! A plane is `origin + q · 2^e`, the same two operations in f32 wherever it is computed. The
-//! product is exact or infinite, the sum is monotone in q. The coder computes what readers will,
-//! and moves q outwards until that is outside: so rounding is part of the proof.
+//! A plane is `origin + q · 2^e` in f32, and the sum is monotone in q. The product is exact, so a
+//! fused operation has the same result; or it is infinite, and then a fused one may be finite. The
+//! coder computes both, and moves q outwards until both are outside: so rounding is part of the
+//! proof, whatever instructions a reader has.
 
 use crate::math::{Aabb, exp2i};
 
@@ -25,6 +26,12 @@ pub(super) fn plane(origin: f32, step: f32, q: u8) -> f32 {
     origin + f32::from(q) * step
 }
 
+/// The plane without overflow. Where it is outside, so is a fused one, which is the same but for the
+/// one rounding to f32.
+fn wide_plane(origin: f32, step: f32, q: u8) -> f64 {
+    f64::from(origin) + f64::from(q) * f64::from(step)
+}
+
 impl Lattice {
     /// The finest lattice over `bounds`, which are finite and not empty.
     pub(super) fn over(bounds: Aabb) -> Lattice {
@@ -34,7 +41,11 @@ impl Lattice {
             let fine = (extent / f64::from(LAST)).log2().floor();
             let mut e = (fine as i32).clamp(*EXPONENTS.start(), *EXPONENTS.end());
             // Ends: at 127 the last plane is beyond all finite numbers.
-            while e < 127 && plane(origin[a], exp2i(e), LAST) < hi[a] {
+            let too_low = |step: f32| {
+                plane(origin[a], step, LAST) < hi[a]
+                    || wide_plane(origin[a], step, LAST) < f64::from(hi[a])
+            };
+            while e < 127 && too_low(exp2i(e)) {
                 e += 1;
             }
             e
@@ -56,10 +67,14 @@ impl Lattice {
             let near = |x: f32| ((f64::from(x) - f64::from(o)) / f64::from(step)).clamp(0.0, 255.0);
             let (mut lo, mut hi) = (near(b.min[a]).floor() as u8, near(b.max[a]).ceil() as u8);
             // Plane 0 is the lowest coordinate of the bounds, the last is not below the highest.
-            while lo > 0 && plane(o, step, lo) > b.min[a] {
+            let above =
+                |q: u8, x: f32| plane(o, step, q) > x || wide_plane(o, step, q) > f64::from(x);
+            let below =
+                |q: u8, x: f32| plane(o, step, q) < x || wide_plane(o, step, q) < f64::from(x);
+            while lo > 0 && above(lo, b.min[a]) {
                 lo -= 1;
             }
-            while hi < LAST && plane(o, step, hi) < b.max[a] {
+            while hi < LAST && below(hi, b.max[a]) {
                 hi += 1;
             }
             [lo, hi]
@@ -95,6 +110,8 @@ mod tests {
                     let at = |q: u8| plane(lattice.origin[a], steps[a], q);
                     let [lo, hi] = planes[a];
                     assert!(at(lo) <= b.min[a] && at(hi) >= b.max[a], "{case}: {b:?} {lattice:?}");
+                    let fused = |q: u8| f32::from(q).mul_add(steps[a], lattice.origin[a]);
+                    assert!(fused(lo) <= b.min[a] && fused(hi) >= b.max[a], "{case}: {b:?}");
                     // Not much larger either, where the numbers have room for it.
                     let slack =
                         2.0 * steps[a] + 4.0 * f32::EPSILON * b.max[a].abs().max(b.min[a].abs());
@@ -109,7 +126,11 @@ mod tests {
         let b = Aabb::new(Vec3::splat(f32::MIN), Vec3::splat(f32::MAX));
         let lattice = Lattice::over(b);
         let [lo, hi] = lattice.around(b)[0];
-        assert!(plane(f32::MIN, lattice.steps()[0], lo) <= f32::MIN);
-        assert!(plane(f32::MIN, lattice.steps()[0], hi) >= f32::MAX);
+        let step = lattice.steps()[0];
+        assert!(plane(f32::MIN, step, lo) <= f32::MIN);
+        assert!(plane(f32::MIN, step, hi) >= f32::MAX);
+        // 255 steps of the finest lattice are infinite by themselves, and end below the box.
+        assert!(f32::from(lo).mul_add(step, f32::MIN) <= f32::MIN);
+        assert!(f32::from(hi).mul_add(step, f32::MIN) >= f32::MAX);
     }
 }

@@ -182,7 +182,7 @@ impl Node<'_> {
         for (x, q) in numbers.iter_mut().zip(q) {
             *x = f32::from(q);
         }
-        // As `plane`: the product is exact.
+        // Fused where there is an instruction for it: the coder of boxes knows both.
         let step = f32x8::splat(simd, step);
         f32x8::from_slice(simd, &numbers).mul_add(step, f32x8::splat(simd, origin))
     }

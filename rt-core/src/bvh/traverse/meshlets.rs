@@ -130,7 +130,8 @@ fn visit<S: Simd, L: LeafTest<S>>(
         let hit = near.simd_le(far.min(f32x8::splat(simd, *skip_t))).to_bitmask() as u32;
         let hit = hit & node.slots();
         if at == 0 && hit != 0 {
-            // Traversals request the first four lines. Leaves are read after the nodes.
+            // Traversals request the first four lines. Leaves are read after the nodes: requested
+            // when a ray needs one, they come too late.
             prefetch::<8, _>(units, meshlet.unit() + 8);
         }
         let now = hit & node.leaf_slots();
