@@ -173,17 +173,24 @@ fn doubts_summary(record: &Record) -> String {
     if why.is_empty() { String::new() } else { format!(" In doubt: {}.", why.join("; ")) }
 }
 
-/// The newest record with this id: folders of `bench/runs` begin with their dates.
+/// The newest record with this id, by when it was measured: two machines may have a folder of one
+/// day each, and their names say nothing of the order.
 fn newest(root: &Path, id: &str) -> anyhow::Result<(Record, PathBuf)> {
     let runs = root.join("bench/runs");
     let entries = std::fs::read_dir(&runs)
         .with_context(|| format!("cannot read the folder `{}`", runs.display()))?;
     let folders = entries.flatten().map(|e| e.path());
-    let folder =
-        folders.filter(|f| f.join(format!("{id}.json")).is_file()).max().with_context(|| {
-            format!("`{}` has no record `{id}`: measure with --record", runs.display())
-        })?;
-    Ok((Record::read(&folder.join(format!("{id}.json")))?, folder))
+    let records = folders.filter(|f| f.join(format!("{id}.json")).is_file()).map(|folder| {
+        let record = Record::read(&folder.join(format!("{id}.json")))?;
+        Ok((record, folder))
+    });
+    let records = records.collect::<anyhow::Result<Vec<_>>>()?;
+    let newest = records
+        .into_iter()
+        .max_by(|(a, in_a), (b, in_b)| (&a.machine.date, in_a).cmp(&(&b.machine.date, in_b)));
+    newest.with_context(|| {
+        format!("`{}` has no record `{id}`: measure with --record", runs.display())
+    })
 }
 
 fn plot_with_title<'r>(record: &'r Record, title: &str) -> anyhow::Result<&'r Plot> {
@@ -314,6 +321,21 @@ mod tests {
             "{text}"
         );
         assert_eq!(stale_quotations(root.path()).unwrap(), []);
+    }
+
+    #[test]
+    fn of_two_machines_on_one_day_the_later_record_is_quoted() {
+        let root = repository(
+            "<!-- record speed: table mesh, time where mesh = small -->\n<!-- end record -->\n",
+        );
+        let earlier = root.path().join("bench/runs/2026-01-02-b");
+        let later = root.path().join("bench/runs/2026-01-02-a");
+        let mut record = Record::read(&earlier.join("speed.json")).unwrap();
+        record.machine.date = format!("{}+", record.machine.date);
+        record.write(&later).unwrap();
+        update(root.path()).unwrap();
+        let text = std::fs::read_to_string(root.path().join("docs/src/bench/page.md")).unwrap();
+        assert!(text.contains("(../../../bench/runs/2026-01-02-a/speed.csv)"), "{text}");
     }
 
     #[test]
