@@ -26,8 +26,8 @@ pub(super) fn plane(origin: f32, step: f32, q: u8) -> f32 {
     origin + f32::from(q) * step
 }
 
-/// The plane without overflow. Where it is outside, so is a fused one, which is the same but for the
-/// one rounding to f32.
+/// The plane without overflow. Where it is outside, so is a fused one, which is the same rounded to
+/// f32.
 fn wide_plane(origin: f32, step: f32, q: u8) -> f64 {
     f64::from(origin) + f64::from(q) * f64::from(step)
 }
