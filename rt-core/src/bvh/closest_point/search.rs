@@ -64,11 +64,11 @@ impl<'w> Search<'w> {
                 let mut cache = cache.borrow_mut();
                 self.visit(units, local, scale2, |search, leaf| {
                     let (expanded, words) =
-                        dispatch!(level, simd => cache.meshlet(simd, tree.meshlets(), units, leaf));
+                        dispatch!(level, simd => cache.last.meshlet(simd, tree.meshlets(), units, leaf));
                     let (nodes, leaves) =
                         dispatch!(level, simd => expanded.with_all_nodes(simd, words));
                     search.visit(nodes, local, scale2, |search, leaf| {
-                        let units = dispatch!(level, simd => leaves.with_named(simd, words, leaf));
+                        let units = dispatch!(level, simd => leaves.with(simd, words, leaf));
                         search.test_leaf(units, leaf, entry, &render_from_local);
                     });
                 });

@@ -46,18 +46,6 @@ impl MeshletCache {
         let last = LastMeshlets { held: [(0, 0); 1 << SLOTS_LOG2], expanded };
         Box::new(RefCell::new(MeshletCache { last, search }))
     }
-
-    /// As [`LastMeshlets::meshlet`].
-    #[inline(always)]
-    pub(crate) fn meshlet<'u, S: Simd>(
-        &mut self,
-        simd: S,
-        key: u64,
-        units: &'u [Unit],
-        leaf: ChildRef,
-    ) -> (&mut Expanded, &'u [u32]) {
-        self.last.meshlet(simd, key, units, leaf)
-    }
 }
 
 impl LastMeshlets {

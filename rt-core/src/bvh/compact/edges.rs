@@ -3,8 +3,9 @@
 //! An isosurface of a lattice has its vertices where it crosses edges: of each vertex, two
 //! coordinates are those of lattice planes, which many others share, and one is free. So a meshlet
 //! stores the few values of the planes once per axis, and for each vertex which axis is free, what
-//! is to be added to the smallest integer of that axis, and two numbers of planes. (Of nested
-//! isosurfaces of the wavelet, this takes a third of the bits of three free coordinates.)
+//! is to be added to the smallest integer of that axis, and two numbers of planes. (The stored file
+//! of 259 million triangles of nested isosurfaces went from 18.2 to 16.1 bytes each by this and by
+//! two words less per meshlet.)
 
 use super::bits::{self, Writer};
 use super::coordinates::{Axis, Coordinates, Values, float, ordered};
@@ -12,10 +13,10 @@ use super::coordinates::{Axis, Coordinates, Values, float, ordered};
 /// Bits of the axis that is free.
 const AXIS_BITS: u32 = 2;
 
-/// Values on planes that do not occur twice, in a meshlet that is still coded so.
+/// Most planes, of all axes together, with one vertex each in a meshlet that is coded so.
 const MAX_SINGLE: usize = 16;
 
-/// Planes of all axes together, in a meshlet that is coded so.
+/// Most planes, of all axes together, in a meshlet that is coded so.
 const MAX_PLANES: usize = 96;
 
 /// The bits of a vertex.

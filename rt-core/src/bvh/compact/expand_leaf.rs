@@ -61,12 +61,7 @@ impl ExpandedLeaves {
     /// The units that hold `leaf`, which a node that is expanded names. It is expanded first where
     /// it is not. `words` start with the meshlet.
     #[inline(always)]
-    pub(crate) fn with_named<S: Simd>(
-        &mut self,
-        simd: S,
-        words: &[u32],
-        leaf: ChildRef,
-    ) -> &[Unit] {
+    pub(crate) fn with<S: Simd>(&mut self, simd: S, words: &[u32], leaf: ChildRef) -> &[Unit] {
         let number = leaf.unit() / TRI_LEAF_UNITS;
         if self.present >> number & 1 == 0 {
             self.expand(simd, words, number);
@@ -77,7 +72,7 @@ impl ExpandedLeaves {
     /// A reference to leaf `number` with these triangles, which is expanded first where it is not.
     /// It has their count: whoever asks for all hits must not get the last triangle four times.
     #[inline(always)]
-    pub(crate) fn with<S: Simd>(
+    pub(crate) fn leaf<S: Simd>(
         &mut self,
         simd: S,
         words: &[u32],
@@ -131,7 +126,7 @@ impl ExpandedLeaves {
             return None;
         }
         let reference = leaf_reference(leaf);
-        let floats = leaf_floats(self.with_named(simd, words, reference), reference);
+        let floats = leaf_floats(self.with(simd, words, reference), reference);
         let at = |corner: usize, axis: usize| floats[4 * (3 * corner + axis) + slot];
         let corner = |k: usize| Vec3::new(at(k, 0), at(k, 1), at(k, 2));
         Some((leaf_triangle_ids(floats)[slot], [corner(0), corner(1), corner(2)]))

@@ -105,7 +105,7 @@ impl Page {
                     continue;
                 }
                 let meshlet = ChildRef::leaf(unit, 1);
-                let (expanded, words) = cache.meshlet(simd, key, units, meshlet);
+                let (expanded, words) = cache.last.meshlet(simd, key, units, meshlet);
                 if let Some((id, corners)) = expanded.triangle(simd, words, leaf, slot) {
                     found(lane, PageHit { first: self.first, id, corners });
                 }

@@ -45,7 +45,7 @@ impl<S: Simd, L: LeafTest<S>> LeafTest<S> for Meshlets<'_, '_, L> {
             && after != before
             && let Some(id) = after
         {
-            let (expanded, _) = cache.meshlet(simd, self.key, units, leaf);
+            let (expanded, _) = cache.last.meshlet(simd, self.key, units, leaf);
             self.place = Some(expanded.leaves.place_of(leaf.unit(), id));
         }
         over
@@ -144,8 +144,8 @@ fn visit<S: Simd, L: LeafTest<S>>(
                 let (mut refs, mut two) = ([0; WIDTH], 0);
                 for _ in 0..2 {
                     let slot = rest.trailing_zeros() as usize & 7;
-                    let (leaf, first, last) = node.leaf_in(slot);
-                    refs[slot] = expanded.leaves.with(simd, words, leaf, first, last).0;
+                    let (number, first, last) = node.leaf_in(slot);
+                    refs[slot] = expanded.leaves.leaf(simd, words, number, first, last).0;
                     two |= 1 << slot;
                     rest &= rest - 1;
                     if rest == 0 {

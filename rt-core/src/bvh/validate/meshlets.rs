@@ -58,7 +58,7 @@ impl CompactBvh {
         let level = Level::new();
         let units = &self.bvh.units;
         let (expanded, words) =
-            dispatch!(level, simd => cache.meshlet(simd, self.key, units, meshlet));
+            dispatch!(level, simd => cache.last.meshlet(simd, self.key, units, meshlet));
         let (nodes, leaves) = dispatch!(level, simd => expanded.with_all_nodes(simd, words));
         // A box of the small tree may stick out of the one around it, which is rounded too.
         let mut todo = vec![(ChildRef::node(0), vec![bounds])];
@@ -73,7 +73,7 @@ impl CompactBvh {
             }
             stats.leaves += 1;
             stats.primitives += child.count();
-            let units = dispatch!(level, simd => leaves.with_named(simd, words, child));
+            let units = dispatch!(level, simd => leaves.with(simd, words, child));
             let ids = leaf_triangle_ids(leaf_floats(units, child));
             mark(&ids[..child.count()])?;
             for slot in 0..child.count() {

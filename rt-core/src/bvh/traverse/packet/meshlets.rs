@@ -100,7 +100,7 @@ impl<S: Simd, T: TriangleTest, Q: HitQuery, O: PacketOrigin, B: BoxTest> PacketL
         _: &[u16; LANES],
     ) -> u16 {
         let mut cache = self.cache.borrow_mut();
-        let (expanded, words) = cache.meshlet(simd, self.key, units, leaf);
+        let (expanded, words) = cache.last.meshlet(simd, self.key, units, leaf);
         let (nodes, leaves) = expanded.with_all_nodes(simd, words);
         let (triangles, unit) = (&mut self.triangles, leaf.unit());
         let mut inner = MeshletLeaves { triangles, leaves, words, unit, changed: 0 };
@@ -214,7 +214,7 @@ impl<S: Simd, T: TriangleTest, Q: HitQuery, O: PacketOrigin> PacketLeaf<S>
         reached: u16,
         lanes: &[u16; LANES],
     ) -> u16 {
-        let units = self.leaves.with_named(simd, self.words, leaf);
+        let units = self.leaves.with(simd, self.words, leaf);
         let changed = self.triangles.leaf(packet, simd, units, leaf, reached, lanes);
         if !Q::ANY && changed != 0 && packet.keeps_places {
             let first = TrianglePlace::of_leaf(self.unit, leaf.unit() / TRI_LEAF_UNITS);
