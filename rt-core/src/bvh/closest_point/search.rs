@@ -61,10 +61,10 @@ impl<'w> Search<'w> {
         if tree.meshlets() != 0 {
             let level = self.world.level;
             with_cache(|cache| {
-                let mut cache = cache.borrow_mut();
+                let last = &mut cache.borrow_mut().last;
                 self.visit(units, local, scale2, |search, leaf| {
                     let (expanded, words) =
-                        dispatch!(level, simd => cache.last.meshlet(simd, tree.meshlets(), units, leaf));
+                        dispatch!(level, simd => last.meshlet(simd, tree.meshlets(), units, leaf));
                     let (nodes, leaves) =
                         dispatch!(level, simd => expanded.with_all_nodes(simd, words));
                     search.visit(nodes, local, scale2, |search, leaf| {
