@@ -71,7 +71,10 @@ fn check_meshlet(words: &[u32]) -> Result<(), &'static str> {
     let at = check_nodes(words, &header)?;
 
     // ---- Triangles and vertices: 64 bits are read at a time, from where one starts.
-    let sections = header.sections(at);
+    if at != HEADER_WORDS + header.node_words as usize {
+        return Err("the nodes of a meshlet do not end where its header says");
+    }
+    let sections = header.sections();
     if sections.end / 32 + 3 > words.len() {
         return Err("the numbers of a meshlet end outside");
     }

@@ -36,9 +36,7 @@ impl Expanded {
                 let header = Header::read(words);
                 self.has_nodes = false;
                 self.count = (header.nodes as usize).min(MAX_NODES);
-                let mut starts = NodeStarts::new();
-                let at = Nodes::new(words, &mut starts).end(self.count);
-                self.leaves.load(&header, at);
+                self.leaves.load(&header);
             },
         );
     }

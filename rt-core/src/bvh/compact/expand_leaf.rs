@@ -21,11 +21,18 @@ pub(crate) struct ExpandedLeaves {
     /// First triangle and last triangle of each leaf that a ray has reached, or an expanded node
     /// names.
     triangles: [[u8; 2]; MAX_LEAVES],
+    coding: LeafCoding,
+}
+
+/// How the triangles of a meshlet are coded.
+struct LeafCoding {
     index_bits: u32,
     id_bits: u32,
     first_id: u32,
     sections: Sections,
 }
+
+type LeafFloats = [f32; 8 * TRI_LEAF_UNITS];
 
 /// A reference to a leaf of an expanded meshlet.
 fn leaf_reference(leaf: usize) -> ChildRef {
@@ -37,19 +44,15 @@ impl ExpandedLeaves {
         units: [Unit::ZERO; LEAVES],
         present: 0,
         triangles: [[0; 2]; MAX_LEAVES],
-        index_bits: 0,
-        id_bits: 0,
-        first_id: 0,
-        sections: Sections::EMPTY,
+        coding: LeafCoding { index_bits: 0, id_bits: 0, first_id: 0, sections: Sections::EMPTY },
     };
 
-    /// Takes the leaves of a meshlet whose nodes end before word `at`.
+    /// Takes the leaves of a meshlet.
     #[inline(always)]
-    pub(super) fn load(&mut self, header: &Header, at: usize) {
+    pub(super) fn load(&mut self, header: &Header) {
         self.present = 0;
-        (self.index_bits, self.id_bits) = (header.index_bits, header.id_bits);
-        self.first_id = header.first_id;
-        self.sections = header.sections(at);
+        let &Header { index_bits, id_bits, first_id, .. } = header;
+        self.coding = LeafCoding { index_bits, id_bits, first_id, sections: header.sections() };
     }
 
     /// Notes which triangles a leaf has.
@@ -132,27 +135,37 @@ impl ExpandedLeaves {
         Some((leaf_triangle_ids(floats)[slot], [corner(0), corner(1), corner(2)]))
     }
 
-    #[inline(never)]
+    #[inline(always)]
     fn expand<S: Simd>(&mut self, simd: S, words: &[u32], leaf: usize) {
+        let units = &mut self.units[TRI_LEAF_UNITS * leaf..][..TRI_LEAF_UNITS];
+        let floats: &mut [f32] = bytemuck::cast_slice_mut(units);
+        let floats: &mut LeafFloats = floats.try_into().expect("a leaf's units");
+        self.coding.expand(simd, words, self.triangles[leaf], floats);
+        self.present |= 1 << leaf;
+    }
+}
+
+impl LeafCoding {
+    /// Expands the leaf with these first and last triangles.
+    // A function of its own, whose arguments overlap nowhere: what is written need not be read
+    // again.
+    #[inline(never)]
+    fn expand<S: Simd>(&self, simd: S, words: &[u32], ends: [u8; 2], floats: &mut LeafFloats) {
         simd.vectorize(
             #[inline(always)]
-            || self.expand_body(words, leaf),
+            || self.expand_body(words, ends, floats),
         );
     }
 
     #[inline(always)]
-    fn expand_body(&mut self, words: &[u32], leaf: usize) {
-        // Copies: what is written cannot change them, so they need not be read again.
-        let (sections, index_bits, first_id) = (self.sections, self.index_bits, self.first_id);
-        let [first, last] = self.triangles[leaf].map(u32::from);
-        let units = &mut self.units[TRI_LEAF_UNITS * leaf..][..TRI_LEAF_UNITS];
-        let floats: &mut [f32] = bytemuck::cast_slice_mut(units);
-        let floats: &mut [f32; 8 * TRI_LEAF_UNITS] = floats.try_into().expect("a leaf's units");
+    fn expand_body(&self, words: &[u32], ends: [u8; 2], floats: &mut LeafFloats) {
+        let &LeafCoding { index_bits, id_bits, first_id, ref sections } = self;
+        let [first, last] = ends.map(u32::from);
 
         // ---- Triangles: one read each. Unused slots repeat the last triangle, as in the ordinary
         // tree.
         let vertex_mask = (1 << index_bits) - 1;
-        let id_mask = (1u64 << self.id_bits) - 1;
+        let id_mask = (1u64 << id_bits) - 1;
         let mut starts = [0; CORNERS];
         for slot in 0..LEAF_SIZE {
             let number = (first + slot as u32).min(last);
@@ -194,6 +207,5 @@ impl ExpandedLeaves {
                     .copy_from_slice(&row[LEAF_SIZE * corner..][..LEAF_SIZE]);
             }
         }
-        self.present |= 1 << leaf;
     }
 }

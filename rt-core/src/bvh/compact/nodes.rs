@@ -149,12 +149,6 @@ impl<'u, 's> Nodes<'u, 's> {
         let planes = self.words[at + 1..].first_chunk().expect("words behind every node");
         Node { planes, start, kinds, children: Children::of(kinds) }
     }
-
-    /// The first word behind the nodes, of which there are `count`.
-    pub(super) fn end(&mut self, count: usize) -> usize {
-        let Node { start, kinds, .. } = self.node(count - 1);
-        start.next(kinds).word()
-    }
 }
 
 impl Node<'_> {
