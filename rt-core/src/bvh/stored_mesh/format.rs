@@ -30,7 +30,7 @@ use crate::paging::fields::{Fields, checksum, get, get_u32, get_u64};
 use glam::{DVec3, Vec3};
 
 pub(super) const MAGIC: &[u8; 8] = b"RTSVMESH";
-pub(super) const VERSION: u32 = 4;
+pub(super) const VERSION: u32 = 5;
 pub(super) const HEADER_BYTES: usize = 128;
 pub(super) const ENTRY_BYTES: usize = 64;
 /// Bytes of a unit of a page.

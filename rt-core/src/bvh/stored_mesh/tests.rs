@@ -188,7 +188,7 @@ fn bytes_that_were_cut_or_are_something_else_are_refused() {
         let mut other = whole.clone();
         other[8] = version;
         let error = open(&other).expect("another version");
-        let expected = format!("version {version} of the format; this program reads version 4");
+        let expected = format!("version {version} of the format; this program reads version 5");
         assert!(error.contains(&expected), "{error}");
     }
     let error = open(b"solid ball").expect("another format");
