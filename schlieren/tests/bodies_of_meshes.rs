@@ -6,8 +6,8 @@ mod outlines;
 use datasets::model::{Block, DataArray, Dataset, Points, PolyData, UnstructuredGrid, Values};
 use glam::DVec3;
 use outlines::{Plane, hide, options, statuses};
-use schlieren::input::{Medium, Options, Outside, cells_from_dataset};
-use schlieren::path::Status::{Blocked, Free};
+use schlieren::input::{Medium, Options, Outside, Role, cells_from_dataset, from_dataset};
+use schlieren::path::Status::{Blocked, Free, Masked};
 
 /// Places in the cylinder, in the gas, in a corner of the box, and beside the box.
 const PLACES: [[f64; 2]; 8] = [
@@ -58,6 +58,58 @@ fn hidden_cells_through_the_whole_span_are_black_on_cells_as_in_a_lattice() {
         assert_eq!(found[0][4..], expected[4..], "{layers}");
         assert_eq!(found[1][..3], expected[..3], "{layers}");
         assert_eq!(found[1][4..], expected[4..], "{layers}");
+    }
+}
+
+/// Hidden cells are gas and places without cells are blank, in whatever order light meets them.
+#[test]
+fn hidden_gas_and_blank_places_outside_are_told_apart_on_cells_as_in_a_lattice() {
+    let square = |u: f64, v: f64| [4.0 * u - 2.0, 4.0 * v - 2.0];
+    let whole = Plane::default().with_block([40, 40], square);
+    let ring = Plane::default().around_cylinder([0.0, 1.0], true);
+    let through = |plane: &Plane, hidden_to: f64, roles, direction, places: &[[f64; 2]]| {
+        let mut grid = plane.thick(4, None);
+        hide(&mut grid, |[x, y]| x.hypot(y) < hidden_to);
+        let data = Dataset::UnstructuredGrid(grid);
+        let (outside, hidden) = roles;
+        let options = Options { hidden, ..options(&data, outside) };
+        statuses(&data, &options, direction, places)
+    };
+    let gas = (Outside::Blank, Role::Gas);
+    // No place is outside: the hidden cells reach the sides of the box.
+    assert_eq!(through(&whole, 0.6, gas, DVec3::Z, &PLACES), [[Free; 8]; 2]);
+    // Hidden cells lie around a hole. Light along the span meets no gas with values there.
+    let along_span = [[0.0, 0.0], [0.3, 0.1], [0.65, 0.0], [0.0, -0.7], [1.2, 0.4]];
+    let expected = [Masked, Masked, Free, Free, Free];
+    assert_eq!(through(&ring, 0.8, gas, DVec3::Z, &along_span), [expected; 2]);
+    // Light along x goes through hidden cells, the hole and hidden cells again, or beside the hole.
+    let across = [[0.0, 0.05], [0.0, 0.3], [0.0, 0.65], [0.0, 1.5]];
+    let expected = [Masked, Masked, Free, Free];
+    assert_eq!(through(&ring, 0.8, gas, DVec3::X, &across), [expected; 2]);
+    // A body is met before what is blank, on either side.
+    let solid = (Outside::Solid, Role::Blank);
+    let expected = [Blocked, Blocked, Masked, Free];
+    assert_eq!(through(&ring, 0.8, solid, DVec3::X, &across)[0], expected);
+}
+
+#[test]
+fn a_choice_for_hidden_cells_of_a_mesh_without_any_is_named() {
+    let square = |u: f64, v: f64| [4.0 * u - 2.0, 4.0 * v - 2.0];
+    let mut grid = Plane::default().with_block([8, 8], square).thick(4, None);
+    for with_hidden in [false, true] {
+        if with_hidden {
+            hide(&mut grid, |[x, y]| x.hypot(y) < 0.6);
+        }
+        let data = Dataset::UnstructuredGrid(grid.clone());
+        let options = Options { hidden: Role::Gas, ..options(&data, Outside::Blank) };
+        let [cells, lattice] = [
+            cells_from_dataset(&data, &options).unwrap().1.warnings,
+            from_dataset(&data, &options).unwrap().report.warnings,
+        ];
+        for warnings in [cells, lattice] {
+            let named = warnings.iter().any(|w| w.contains("flow.hidden has no effect"));
+            assert_eq!(named, !with_hidden, "{warnings:?}");
+        }
     }
 }
 

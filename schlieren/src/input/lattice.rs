@@ -91,6 +91,20 @@ impl SamplePoints {
         ))
     }
 
+    /// Names a choice for hidden cells where there is none.
+    pub(super) fn hidden_warning(&self, options: &Options) -> Option<String> {
+        let is_any_hidden = match self {
+            SamplePoints::Uniform { .. } => false,
+            SamplePoints::Mesh { mesh, .. } => mesh.num_hidden() > 0,
+        };
+        let is_chosen = options.hidden != super::Role::Solid;
+        (is_chosen && !is_any_hidden).then(|| {
+            "flow.hidden has no effect: the file hides no cell (vtkGhostType, iblank 0); places \
+             without cells are as flow.outside says"
+                .into()
+        })
+    }
+
     /// The values of an array, in the order of the points.
     pub(super) fn values(&self, data: &Dataset, color: &ColorBy) -> Vec<f64> {
         let of = |a: &Attributes, i: usize| {

@@ -37,6 +37,7 @@ pub fn cells_from_dataset(
     let mut report = Report::default();
     let points = SamplePoints::on_cells(data, options)?;
     report.warnings.extend(points.turn_warning());
+    report.warnings.extend(points.hidden_warning(options));
     let columns = options.medium.columns(data, &points)?;
     let mut index = evaluate::evaluate(&columns, options, &mut report)?;
     drop(columns);

@@ -332,7 +332,7 @@ impl Piecewise<'_, '_> {
         let stretch_m = entry.map_or(left_m, |e| e.distance);
         if stretch_m > gap_m {
             let ends = [before, entry.map_or(Beyond::Outside, |e| e.from)];
-            let met = self.on_stretch(at_m, direction, [stretch_m, slack_m], ends);
+            let met = self.on_stretch(at_m, direction, [stretch_m, slack_m, gap_m], ends);
             if met != Node::Gas {
                 return Err(End::Stopped(met));
             }
@@ -363,30 +363,47 @@ impl Piecewise<'_, '_> {
     }
 
     /// What a stretch outside the cells meets: a body before blank places, and these before gas.
-    /// `ends` is what the faces say between which it lies.
+    /// `ends` is what the faces say between which it lies. Gaps between hidden cells are none, as
+    /// those between blocks of gas.
     fn on_stretch(
         &self,
         at_m: DVec3,
         direction: DVec3,
-        [length_m, slack_m]: [f64; 2],
+        [length_m, slack_m, gap_m]: [f64; 3],
         ends: [Beyond; 2],
     ) -> Node {
         let gas = self.paths.gas;
-        let mut met = ends.map(|end| match end {
+        let at_end = |end: Beyond| match end {
             Beyond::Hidden => gas.hidden,
             Beyond::Wall => gas.walls,
             Beyond::Cell(_) | Beyond::Outside => gas.outside,
-        });
-        // Where no face tells of a body, one may be between.
-        if !met.contains(&Node::Solid) && !ends.contains(&Beyond::Hidden) {
-            if self.walker.passes_hidden(at_m, direction, length_m, slack_m) {
-                met[0] = if gas.hidden == Node::Gas { met[0] } else { gas.hidden };
-            } else if gas.walls != gas.outside && self.walker.passes_body(at_m, direction, length_m)
-            {
-                met[0] = gas.walls;
+        };
+        let hidden = ends.map(|end| end == Beyond::Hidden);
+        let pieces = self.walker.beside_hidden(at_m, direction, length_m, slack_m, hidden);
+        let beside_m: f64 = pieces.iter().map(|[from, to]| to - from).sum();
+        let is_hidden = hidden.contains(&true) || length_m - beside_m > gap_m;
+        let mut met = if is_hidden { gas.hidden } else { Node::Gas };
+        for [from_m, to_m] in pieces {
+            if met == Node::Solid {
+                break;
+            }
+            if to_m - from_m <= gap_m {
+                continue;
+            }
+            let [first, last] = [from_m <= 0.0, to_m >= length_m];
+            let of_ends = [(first, ends[0]), (last, ends[1]), (!first && !last, Beyond::Outside)];
+            for end in of_ends.into_iter().filter(|e| e.0) {
+                met = worst(met, at_end(end.1));
+            }
+            // Where no face tells of a body, one may be between.
+            if met != Node::Solid && gas.walls != gas.outside {
+                let (from, long_m) = (at_m + direction * from_m, to_m - from_m);
+                if self.walker.passes_body(from, direction, long_m) {
+                    met = worst(met, gas.walls);
+                }
             }
         }
-        [Node::Solid, Node::Blank].into_iter().find(|n| met.contains(n)).unwrap_or(Node::Gas)
+        met
     }
 
     /// Makes the length of w that of the medium, 1 + eps, as a window across the undisturbed ray
@@ -455,6 +472,12 @@ impl LightPaths for OnCells<'_> {
             exits[*i as usize] = *exit;
         }
     }
+}
+
+/// A body before a blank place, and this before gas.
+fn worst(one: Node, other: Node) -> Node {
+    let met = [one, other];
+    [Node::Solid, Node::Blank].into_iter().find(|n| met.contains(n)).unwrap_or(Node::Gas)
 }
 
 /// The bits of a number with a zero between every two: half of a Morton code.

@@ -115,48 +115,64 @@ impl Border {
     ) -> Option<Passage> {
         let mut best: Option<Passage> = None;
         self.tree.on_line(at, direction, [-slack, most], |face| {
-            self.pass(mesh, face, at, direction, most, slack, &mut best);
+            self.each_passage(mesh, face, at, direction, |new| {
+                let from = if new.inwards { -slack } else { slack };
+                let counts =
+                    (from..=most).contains(&new.distance) && (new.inwards || new.distance > from);
+                // At the same place, entering comes before leaving, and a cell before those after
+                // it.
+                let key = |p: &Passage| (!p.inwards, p.cell);
+                let better = best.is_none_or(|old| {
+                    new.distance < old.distance
+                        || new.distance == old.distance && key(&new) < key(&old)
+                });
+                if counts && better {
+                    best = Some(new);
+                }
+            });
             best.map_or(most, |b| b.distance)
         });
         best
     }
 
+    /// All passages of the line from `at` in `direction` between two distances, in the order of
+    /// these. One through an edge comes once for each of the edge's faces.
+    pub(super) fn passages(
+        &self,
+        mesh: &Mesh,
+        at: DVec3,
+        direction: DVec3,
+        [from, to]: [f64; 2],
+    ) -> Vec<Passage> {
+        let mut all = Vec::new();
+        self.tree.on_line(at, direction, [from, to], |face| {
+            self.each_passage(mesh, face, at, direction, |new| {
+                all.extend((from..=to).contains(&new.distance).then_some(new));
+            });
+            to
+        });
+        all.sort_by(|a, b| a.distance.total_cmp(&b.distance).then(a.cell.cmp(&b.cell)));
+        all
+    }
+
     /// Passages of one face.
-    fn pass(
+    fn each_passage(
         &self,
         mesh: &Mesh,
         face: u32,
         at: DVec3,
         direction: DVec3,
-        most: f64,
-        slack: f64,
-        best: &mut Option<Passage>,
+        mut f: impl FnMut(Passage),
     ) {
-        let f = self.faces[face as usize];
-        let ring = &self.rings[f.first..f.first + f.count as usize];
+        let Face { cell, first, count, beyond, clockwise } = self.faces[face as usize];
+        let ring = &self.rings[first..first + count as usize];
         let place = |i: usize| mesh.point(ring[i] as usize) - at;
         let count = ring.len();
         let sum: DVec3 = (0..count).map(place).sum();
         let middle = sum / count as f64;
         each_triangle(count, middle, place, |triangle| {
-            let Some((distance, along)) = line_through(triangle, direction) else { return };
-            let inwards = along == f.clockwise;
-            let from = if inwards { -slack } else { slack };
-            if distance.is_nan()
-                || distance < from
-                || distance > most
-                || !inwards && distance == from
-            {
-                return;
-            }
-            // At the same place, entering comes before leaving, and a cell before those after it.
-            let new = Passage { distance, cell: f.cell, inwards, beyond: f.beyond };
-            let key = |p: &Passage| (!p.inwards, p.cell);
-            let better = best.is_none_or(|old| {
-                distance < old.distance || distance == old.distance && key(&new) < key(&old)
-            });
-            if better {
-                *best = Some(new);
+            if let Some((distance, along)) = line_through(triangle, direction) {
+                f(Passage { distance, cell, inwards: along == clockwise, beyond });
             }
         });
     }

@@ -20,6 +20,7 @@
 //! that neighbours of different types leave no gap. Where the faces of two blocks do not match, the
 //! line leaves one at its border and enters the other at its own.
 
+mod beside_hidden;
 mod blend;
 mod bodies;
 mod border;

@@ -1,6 +1,7 @@
 //! Follows lines from cell to cell.
 
 use super::CellField;
+use super::beside_hidden;
 use super::blend::{Mean, Share};
 use super::cell::PreparedCell;
 use crate::resample::mesh::{HIDDEN, OUTSIDE, WALL};
@@ -171,11 +172,19 @@ impl<'a> CellWalker<'a> {
         bodies.as_ref().is_some_and(|b| b.meet(mesh, at, direction, most))
     }
 
-    /// Whether the line passes the border of the mesh at a hidden cell within `most`. `slack` is
-    /// how far `at` may be beyond that border.
-    pub fn passes_hidden(&self, at: DVec3, direction: DVec3, most: f64, slack: f64) -> bool {
+    /// The pieces, from and to, of the line from `at` in `direction`, of length one, up to `length`
+    /// that lie in no hidden cell. The line is one outside the cells with values; `ends_hidden`
+    /// says whether it begins and ends at a hidden cell. `slack` is how far `at` may be beyond a face.
+    pub fn beside_hidden(
+        &self,
+        at: DVec3,
+        direction: DVec3,
+        length: f64,
+        slack: f64,
+        ends_hidden: [bool; 2],
+    ) -> Vec<[f64; 2]> {
         let CellField { mesh, hidden, .. } = self.field;
-        hidden.first_passage(mesh, at, direction, most, slack).is_some()
+        beside_hidden::pieces(hidden, mesh, at, direction, [length, slack], ends_hidden)
     }
 
     /// A cell that a place is in, of those that are near a cell: its neighbours, and theirs.
