@@ -13,6 +13,8 @@ use std::collections::VecDeque;
 
 /// Distance of samples on a face, in nodes.
 const STEP: f64 = 0.5;
+/// Nodes up to this distance along each axis are beside a sample: one, and a rounding.
+const STEP_BESIDE: f64 = 1.0 + 1e-6;
 /// Samples along an edge of a triangle, at most.
 const MOST_STEPS: f64 = 4096.0;
 
@@ -80,20 +82,24 @@ impl Nearest<'_> {
     fn add(&mut self, p: DVec3, is_wall: bool) {
         let dims = self.lattice.dims;
         let at = (p - self.lattice.origin) / self.lattice.spacing;
-        let base = at.floor();
-        for corner in 0..8usize {
-            let node: [f64; 3] = std::array::from_fn(|a| base[a] + (corner >> a & 1) as f64);
-            if (0..3).any(|a| !(0.0..dims[a] as f64).contains(&node[a])) {
-                continue;
-            }
-            let i = node[0] as usize + dims[0] * (node[1] as usize + dims[1] * node[2] as usize);
-            if self.marks[i] != Mark::Outside {
-                continue;
-            }
-            let d2 = (at - DVec3::from_array(node)).length_squared() as f32;
-            // At equal distances the wall counts, in whatever order the faces come.
-            if d2 < self.distance2[i] || d2 == self.distance2[i] && is_wall {
-                (self.distance2[i], self.is_wall[i]) = (d2, is_wall);
+        // Nodes at one step too: beside a face through nodes, these are the nearest on either side.
+        let beside = |a: usize| {
+            let [first, last] = [(at[a] - STEP_BESIDE).ceil(), (at[a] + STEP_BESIDE).floor()];
+            let last = last.min(dims[a] as f64 - 1.0);
+            (first.max(0.0) as usize..).take_while(move |i| *i as f64 <= last)
+        };
+        for (k, j) in beside(2).flat_map(|k| beside(1).map(move |j| (k, j))) {
+            for i in beside(0) {
+                let node = i + dims[0] * (j + dims[1] * k);
+                if self.marks[node] != Mark::Outside {
+                    continue;
+                }
+                let away = at - DVec3::new(i as f64, j as f64, k as f64);
+                let d2 = away.length_squared() as f32;
+                // At equal distances the wall counts, in whatever order the faces come.
+                if d2 < self.distance2[node] || d2 == self.distance2[node] && is_wall {
+                    (self.distance2[node], self.is_wall[node]) = (d2, is_wall);
+                }
             }
         }
     }
@@ -275,5 +281,43 @@ mod tests {
         let body = in_bodies(&mesh, &walls, &lattice, &field.marks, false);
         let outside = field.marks.iter().filter(|m| **m == Mark::Outside).count();
         assert!(outside > 50 && body.iter().filter(|b| **b).count() == outside, "{outside}");
+    }
+
+    #[test]
+    fn a_wall_through_nodes_of_the_lattice_has_its_body_on_either_side() {
+        // Eight cells a side without a quarter, which lies on the low or on the high side.
+        let points = (0..729).map(|i| [i % 9, i / 9 % 9, i / 81].map(|x| x as f64)).collect();
+        let points = Points::F64(points);
+        for low in [true, false] {
+            let mut grid =
+                crate::model::UnstructuredGrid { points: points.clone(), ..Default::default() };
+            for c in 0..512usize {
+                let (x, y) = (c % 8, c / 8 % 8);
+                if (x < 4) == low && (y < 4) == low {
+                    continue;
+                }
+                let first = x + 9 * y + 81 * (c / 64);
+                grid.types.push(12);
+                grid.cells.push([0, 1, 10, 9, 81, 82, 91, 90].map(|o| (first + o) as u32));
+            }
+            let of_wall = |i: &u32| {
+                let (x, y) = (i % 9, i / 9 % 9);
+                let beside = |other: u32| if low { other <= 4 } else { other >= 4 };
+                (x == 4 && beside(y)) || (y == 4 && beside(x))
+            };
+            let list = Values::U32((0..729).filter(of_wall).collect());
+            grid.attributes.field.push(DataArray::new(WALL_POINTS, 1, list));
+            let data = Dataset::UnstructuredGrid(grid);
+            let mesh = Mesh::new(&data).unwrap();
+            let walls = Walls::find(&mesh, &data, false);
+            let ends = mesh.bounds();
+            let lattice = Lattice::fit(ends.0, ends.1, 1.0, Resolution::Longest(17)).unwrap();
+            let samples = Samples::Points(&[1.0; 729]);
+            let field = resample(&mesh, samples, &lattice, &Options::default()).unwrap();
+            let body = in_bodies(&mesh, &walls, &lattice, &field.marks, false);
+            let outside = field.marks.iter().filter(|m| **m == Mark::Outside).count();
+            assert_eq!(outside, 8 * 8 * 17, "low: {low}");
+            assert_eq!(body.iter().filter(|b| **b).count(), outside, "low: {low}");
+        }
     }
 }
