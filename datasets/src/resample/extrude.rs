@@ -1,6 +1,6 @@
 //! Gives depth to polygons in a plane: slices of unstructured meshes, and two-dimensional cases.
 
-use crate::model::{CellType, Cells, Points, PolyData, UnstructuredGrid};
+use crate::model::{CellType, Cells, Dataset, Points, PolyData, UnstructuredGrid, extent_dims};
 use glam::DVec3;
 
 const HEXAHEDRON: u8 = 12;
@@ -59,6 +59,18 @@ pub(super) fn has_only_polygons(d: &UnstructuredGrid) -> bool {
 pub(super) fn has_no_solids(d: &UnstructuredGrid) -> bool {
     let solid = |t: &u8| matches!(CellType::of(*t), CellType::Solid(_) | CellType::Polyhedron);
     !d.types.iter().any(solid)
+}
+
+/// Whether a leaf has cells that fill space.
+pub(super) fn has_solids(leaf: &Dataset) -> bool {
+    let is_thick = |dims: [usize; 3]| dims.iter().all(|&d| d >= 2);
+    match leaf {
+        Dataset::ImageData(d) => is_thick(d.dims()),
+        Dataset::RectilinearGrid(d) => is_thick(extent_dims(d.extent)),
+        Dataset::StructuredGrid(d) => is_thick(extent_dims(d.extent)),
+        Dataset::UnstructuredGrid(d) => !has_no_solids(d),
+        Dataset::PolyData(_) | Dataset::MultiBlock(_) => false,
+    }
 }
 
 /// The normal of the plane of all polygons; `None` if they do not lie in one.

@@ -146,9 +146,13 @@ impl Mesh {
             baffles: vec![],
         };
         let mut flat = 0;
-        for (number, leaf) in data.leaves().into_iter().enumerate() {
+        // Beside cells that fill space, polygons in a plane are patches of the border, and no flow.
+        let leaves = data.leaves();
+        let of_leaves = plane.filter(|_| !leaves.iter().any(|l| extrude::has_solids(l)));
+        for (number, leaf) in leaves.into_iter().enumerate() {
             let before = mesh.parts.len();
-            flat += usize::from(mesh.add(leaf, plane)?);
+            let is_flat = mesh.add(leaf, of_leaves)?;
+            flat += usize::from(is_flat && of_leaves == plane);
             mesh.parts[before..].iter_mut().for_each(|p| p.leaf = number);
             mesh.add_baffles(leaf, before);
             let Some(Plane::Extrude { span }) = plane else { continue };
@@ -520,16 +524,7 @@ impl Mesh {
     ) -> Vec<f64> {
         let mut out = Vec::with_capacity(self.points.len());
         self.each_part(data, |part, attributes| {
-            out.extend((0..part.points.len()).map(|i| {
-                let source = match (&part.kind, &part.depth) {
-                    (PartKind::Lattice(n), Some(PartDepth::Layer(axis))) => {
-                        flat_source(i, *n, *axis).0
-                    }
-                    (_, Some(PartDepth::Copies)) => i % (part.points.len() / 2),
-                    _ => i,
-                };
-                value(attributes, source)
-            }));
+            out.extend((0..part.points.len()).map(|i| value(attributes, part.source_of(i))));
         });
         out
     }

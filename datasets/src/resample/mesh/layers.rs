@@ -1,7 +1,7 @@
 //! Lattices within a mesh: the two layers of points that a plane becomes, and hidden cells.
 
 use super::flat::ALONG;
-use super::{HIDDEN_CELL, HIDDEN_POINT, Mesh, PartDepth, PartKind};
+use super::{HIDDEN_CELL, HIDDEN_POINT, Mesh, Part, PartDepth, PartKind};
 use crate::model::Attributes;
 use glam::DVec3;
 
@@ -44,9 +44,30 @@ impl Mesh {
         found
     }
 
+    /// Calls `f` with the number of each leaf of the data and, for each point of the mesh from it,
+    /// the number of the point and that of its source in the leaf.
+    pub(in crate::resample) fn each_source(&self, mut f: impl FnMut(usize, usize, usize)) {
+        for part in &self.parts {
+            for (i, point) in part.points.clone().enumerate() {
+                f(part.leaf, point, part.source_of(i));
+            }
+        }
+    }
+
     /// Calls `f` with the number of each leaf of the data, and the points of the mesh from it.
     pub(in crate::resample) fn each_leaf(&self, mut f: impl FnMut(usize, std::ops::Range<usize>)) {
         self.parts.iter().for_each(|p| f(p.leaf, p.points.clone()));
+    }
+}
+
+impl Part {
+    /// The point of the data that point `i` of the part comes from.
+    pub(super) fn source_of(&self, i: usize) -> usize {
+        match (&self.kind, &self.depth) {
+            (PartKind::Lattice(n), Some(PartDepth::Layer(axis))) => flat_source(i, *n, *axis).0,
+            (_, Some(PartDepth::Copies)) => i % (self.points.len() / 2),
+            _ => i,
+        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Walls that files name: lists of points, and blocks of surfaces.
 
 use super::Walls;
-use crate::model::{Dataset, WALL_POINTS, is_name_of_body};
+use crate::model::{Dataset, WALL_POINTS, extent_dims, is_name_of_body};
 use crate::resample::extrude;
 use crate::resample::mesh::Mesh;
 use glam::DVec3;
@@ -29,7 +29,8 @@ impl Walls {
         any
     }
 
-    /// The points of blocks with the name of a body.
+    /// The points of blocks with the name of a body. Places are compared as the file has them: a
+    /// plane that got depth, or was turned onto two axes, has none of its points where they were.
     pub(super) fn add_blocks(&mut self, mesh: &Mesh, data: &Dataset) {
         let mut names = Vec::new();
         let mut places: HashSet<[u64; 3]> = HashSet::new();
@@ -46,16 +47,38 @@ impl Walls {
         if places.is_empty() {
             return;
         }
+        let leaves = data.leaves();
         let mut found = 0;
-        for i in 0..mesh.num_points() {
-            if places.contains(&place(mesh.point(i))) {
-                self.of_points[i] = true;
+        mesh.each_source(|leaf, point, source| {
+            let at = leaves.get(leaf).and_then(|leaf| point_of(leaf, source));
+            if at.is_some_and(|at| places.contains(&place(at))) {
+                self.of_points[point] = true;
                 found += 1;
             }
-        }
+        });
         if found > 0 {
             self.evidence.push(format!("the surfaces {}", names.join(", ")));
         }
+    }
+}
+
+/// A point of a leaf, as the file has it.
+fn point_of(leaf: &Dataset, i: usize) -> Option<DVec3> {
+    let in_lattice = |n: [usize; 3]| [i % n[0], i / n[0] % n[1], i / n[0] / n[1]];
+    match leaf {
+        Dataset::ImageData(d) => {
+            let [x, y, z] = in_lattice(d.dims());
+            Some(d.point(x, y, z))
+        }
+        Dataset::RectilinearGrid(d) => {
+            let at = in_lattice(extent_dims(d.extent));
+            let [x, y, z] = [0, 1, 2].map(|a| d.coordinates[a][at[a]]);
+            Some(DVec3::new(x, y, z))
+        }
+        Dataset::StructuredGrid(d) => Some(d.points.get(i)),
+        Dataset::UnstructuredGrid(d) => Some(d.points.get(i)),
+        Dataset::PolyData(d) => Some(d.points.get(i)),
+        Dataset::MultiBlock(_) => None,
     }
 }
 
