@@ -4,7 +4,9 @@ mod sample_files;
 #[path = "formats/scenes.rs"]
 mod scenes;
 
-use datasets::model::{Dataset, ImageData, PolyData, StructuredGrid, Values};
+use datasets::model::{
+    Dataset, ImageData, Points, PolyData, StructuredGrid, UnstructuredGrid, Values,
+};
 use datasets::read::plot3d::{self, Plot3dOptions};
 use datasets::read::{Content, LoadedFile, SceneModel, open};
 use datasets::write::{Encoding, VtkOptions, write_obj, write_ply, write_pvd, write_vtk};
@@ -253,6 +255,42 @@ fn surfaces_of_solids_are_closed_and_face_outwards() {
     assert_eq!((scalars.per, scalars.values.len()), (PerElement::Face, 4 + 12 + 12));
     let (mesh, _) = Dataset::ImageData(sample_files::image()).to_trimesh(Some("p")).unwrap();
     assert!((volume(&mesh) - 1.5 * 2.0 * 2.0).abs() < 1e-5);
+}
+
+#[test]
+fn wedges_and_pyramids_keep_their_faces_outwards_in_a_vtu() {
+    let points = [
+        // A wedge of height 2 whose first triangle faces down, and a pyramid on a square.
+        [0.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [1.0, 0.0, 0.0],
+        [0.0, 0.0, 2.0],
+        [0.0, 1.0, 2.0],
+        [1.0, 0.0, 2.0],
+        [3.0, 0.0, 0.0],
+        [4.0, 0.0, 0.0],
+        [4.0, 1.0, 0.0],
+        [3.0, 1.0, 0.0],
+        [3.5, 0.5, 3.0],
+    ];
+    let mut grid = UnstructuredGrid { points: Points::F64(points.to_vec()), ..Default::default() };
+    grid.types = vec![13, 14];
+    grid.cells.push([0, 1, 2, 3, 4, 5]);
+    grid.cells.push([6, 7, 8, 9, 10]);
+    let data = Dataset::UnstructuredGrid(grid);
+    let dir = tempfile::tempdir().unwrap();
+    for (encoding, compress) in
+        [(Encoding::Ascii, false), (Encoding::Base64, false), (Encoding::Base64, true)]
+    {
+        let path = dir.path().join("cells.vtu");
+        write_vtk(&path, &data, VtkOptions { encoding, compress }).unwrap();
+        let again = open(&path).unwrap();
+        let again = again.dataset().unwrap();
+        assert_eq!(again, &data);
+        let (mesh, report) = again.to_trimesh(None).unwrap();
+        assert_eq!((report.dropped(), mesh.num_triangles()), (0, 8 + 6));
+        assert!((volume(&mesh) - 2.0).abs() < 1e-6, "{}", volume(&mesh));
+    }
 }
 
 #[test]

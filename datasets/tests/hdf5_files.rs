@@ -5,6 +5,7 @@ mod peer;
 
 use datasets::model::{Dataset, Values};
 use datasets::read::{OpenOptions, open, open_with};
+use datasets::write::{VtkOptions, write_vtk};
 use std::path::{Path, PathBuf};
 
 fn file(name: &str) -> PathBuf {
@@ -414,6 +415,91 @@ fn sets_of_exodus_are_not_left_out_in_silence() {
     let opened = datasets::read::open(&path).unwrap();
     assert_eq!(opened.format, "Exodus II");
     assert_eq!(opened.warnings, ["3 side sets (boundaries) left out"]);
+}
+
+/// An Exodus II file of one element of this type with these nodes, which count from 1.
+fn exodus_element(kind: &str, points: &[[f64; 3]], nodes: &[u32]) -> Vec<u8> {
+    let mut out = b"CDF\x01\0\0\0\0".to_vec();
+    let words = |out: &mut Vec<u8>, words: &[u32]| {
+        words.iter().for_each(|w| out.extend(w.to_be_bytes()));
+    };
+    let text = |out: &mut Vec<u8>, text: &str| {
+        out.extend((text.len() as u32).to_be_bytes());
+        out.extend(text.bytes());
+        out.resize(out.len().next_multiple_of(4), 0);
+    };
+    let [count, size] = [points.len() as u32, nodes.len() as u32];
+    let dimensions = [
+        ("num_dim", 3),
+        ("num_nodes", count),
+        ("num_elem", 1),
+        ("num_el_blk", 1),
+        ("num_el_in_blk1", 1),
+        ("num_nod_per_el1", size),
+    ];
+    words(&mut out, &[10, dimensions.len() as u32]);
+    for (name, length) in dimensions {
+        text(&mut out, name);
+        words(&mut out, &[length]);
+    }
+    // No attributes, and two variables, each with a place for where its values begin.
+    words(&mut out, &[0, 0, 11, 2]);
+    text(&mut out, "coord");
+    words(&mut out, &[2, 0, 1, 0, 0, 6, 24 * count]);
+    let of_points = out.len();
+    words(&mut out, &[0]);
+    text(&mut out, "connect1");
+    words(&mut out, &[2, 4, 5, 12, 1]);
+    text(&mut out, "elem_type");
+    words(&mut out, &[2]);
+    text(&mut out, kind);
+    words(&mut out, &[4, 4 * size]);
+    let of_nodes = out.len();
+    words(&mut out, &[0]);
+    for (at, begin) in [(of_points, out.len()), (of_nodes, out.len() + 24 * points.len())] {
+        out[at..at + 4].copy_from_slice(&(begin as u32).to_be_bytes());
+    }
+    for axis in 0..3 {
+        points.iter().for_each(|p| out.extend(p[axis].to_be_bytes()));
+    }
+    words(&mut out, nodes);
+    out
+}
+
+/// Programs write the first triangle of a wedge either way round; a .vtu file has it outwards.
+#[test]
+fn wedges_of_exodus_are_not_inside_out_in_a_vtu() {
+    let dir = tempfile::tempdir().unwrap();
+    let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
+    let at = |z: f64| corners.map(|[x, y]| [x, y, z]);
+    let middle = |a: [f64; 3], b: [f64; 3]| [0, 1, 2].map(|k| 0.5 * (a[k] + b[k]));
+    let mut points: Vec<[f64; 3]> = at(0.0).into_iter().chain(at(2.0)).collect();
+    // The middles of the lower, the vertical and the upper edges, as the manual has them.
+    for [a, b] in [[0, 1], [1, 2], [2, 0], [0, 3], [1, 4], [2, 5], [3, 4], [4, 5], [5, 3]] {
+        points.push(middle(points[a], points[b]));
+    }
+    let manual: Vec<u32> = (1..=15).collect();
+    let as_vtk = [1, 3, 2, 4, 6, 5, 9, 8, 7, 10, 12, 11, 15, 14, 13];
+    for nodes in [6, 15] {
+        for order in [&manual[..], &as_vtk] {
+            let path = dir.path().join("wedge.exo");
+            let bytes = exodus_element("WEDGE", &points[..nodes], &order[..nodes]);
+            std::fs::write(&path, bytes).unwrap();
+            let opened = open(&path).unwrap_or_else(|e| panic!("{e}"));
+            let vtu = dir.path().join("wedge.vtu");
+            write_vtk(&vtu, opened.dataset().unwrap(), VtkOptions::default()).unwrap();
+            let opened = open(&vtu).unwrap_or_else(|e| panic!("{e}"));
+            let Dataset::UnstructuredGrid(grid) = opened.dataset().unwrap() else { panic!() };
+            let ids = grid.cells.get(0);
+            assert_eq!(ids[..6], [0, 2, 1, 3, 5, 4], "{nodes} nodes as {order:?}");
+            // Each middle is between the corners that VTK says.
+            let edges = [[0, 1], [1, 2], [2, 0], [3, 4], [4, 5], [5, 3], [0, 3], [1, 4], [2, 5]];
+            for (id, [a, b]) in ids[6..].iter().zip(edges) {
+                let place = |k: u32| grid.points.get(k as usize);
+                assert_eq!(place(*id), 0.5 * (place(ids[a]) + place(ids[b])), "{order:?}");
+            }
+        }
+    }
 }
 
 /// Kinds of quadratic cells with their numbers of nodes.

@@ -1,5 +1,5 @@
 //! The order of the corners of a wedge. In VTK the first triangle is seen from outside, in the
-//! manuals of EnSight and CGNS from inside, and programs write both: the points decide.
+//! manuals of EnSight, CGNS and Exodus II from inside, and programs write both: the points decide.
 
 use crate::model::Points;
 

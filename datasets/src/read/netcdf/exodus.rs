@@ -7,6 +7,7 @@ use super::{Container, Header, Variable};
 use crate::model::{Attributes, Cells, DataArray, Dataset, Points, UnstructuredGrid, Values};
 use crate::read::error::{At, Fault};
 use crate::read::vtk_xml::pieces::integers;
+use crate::read::wedge::{TURNED, is_turned};
 use crate::read::{OpenOptions, TimeStep, time_axis};
 use std::path::Path;
 
@@ -81,6 +82,10 @@ pub(super) fn dataset(
     data.check()?;
     Ok((data, steps))
 }
+
+/// VTK's types of wedges.
+const WEDGE: u8 = 13;
+const QUADRATIC_WEDGE: u8 = 26;
 
 struct Model<'f> {
     file: &'f dyn Container,
@@ -186,7 +191,13 @@ impl Model<'_> {
             self.all(&name)?.iter().flat_map(|v| integers(v).collect::<Vec<_>>()).collect();
         for cell in list.chunks_exact(nodes) {
             let id = |i: usize| Cells::id(cell[in_order(vtk, i)].saturating_sub(1));
-            grid.cells.push((0..kept).map(id));
+            let ids: Vec<u32> = (0..kept).map(id).collect();
+            // In the manual the first triangle of a wedge is seen from inside, and some programs
+            // write it as VTK has it.
+            match matches!(vtk, WEDGE | QUADRATIC_WEDGE) && is_turned(&ids, &grid.points) {
+                true => grid.cells.push(TURNED[..kept].iter().map(|&k| ids[k])),
+                false => grid.cells.push(ids),
+            }
             grid.types.push(vtk);
         }
         Ok(())
@@ -261,8 +272,8 @@ fn shape(kind: &str, nodes: u64) -> Option<(u8, usize)> {
         10 if is(&["TET"]) => (24, 10),
         5 if is(&["PYR"]) => (14, 5),
         13 if is(&["PYR"]) => (27, 13),
-        6 if is(&["WED"]) => (13, 6),
-        15 if is(&["WED"]) => (26, 15),
+        6 if is(&["WED"]) => (WEDGE, 6),
+        15 if is(&["WED"]) => (QUADRATIC_WEDGE, 15),
         8 if is(&["HEX"]) => (12, 8),
         20 | 27 if is(&["HEX"]) => (25, 20),
         _ => return None,
@@ -275,8 +286,8 @@ fn in_order(vtk: u8, i: usize) -> usize {
     match (vtk, i) {
         (25, 12..=15) => i + 4,
         (25, 16..=19) => i - 4,
-        (26, 9..=11) => i + 3,
-        (26, 12..=14) => i - 3,
+        (QUADRATIC_WEDGE, 9..=11) => i + 3,
+        (QUADRATIC_WEDGE, 12..=14) => i - 3,
         _ => i,
     }
 }
