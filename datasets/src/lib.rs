@@ -30,6 +30,7 @@ pub mod image_io;
 pub mod isosurface;
 pub mod model;
 mod paged_file;
+mod plane_of_points;
 pub mod read;
 pub mod resample;
 mod rows;

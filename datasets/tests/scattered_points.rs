@@ -200,12 +200,63 @@ fn rows_are_joined_left_out_and_marked_and_all_is_counted() {
     }
 }
 
+/// Points of the unit square in a plane that slants, bent by so much, with so many digits.
+fn slanting(count: u32, bend: f64, digits: usize) -> String {
+    let [u, v] = [[0.8, 0.36, 0.48], [-0.6, 0.48, 0.64]];
+    let normal = [0.0, -0.8, 0.6];
+    let mut text = String::from("x,y,z,rho\n");
+    for i in 0..count {
+        let [a, b] = [scatter(2 * i), scatter(2 * i + 1)];
+        for axis in 0..3 {
+            let x = 5.0 + a * u[axis] + b * v[axis] + bend * a * a * normal[axis];
+            write!(text, "{x:.digits$},").unwrap();
+        }
+        writeln!(text, "{}", 1.0 + a + b).unwrap();
+    }
+    text
+}
+
+#[test]
+fn points_of_a_plane_that_slants_are_triangles_in_it() {
+    // All digits, and as many as ParaView writes.
+    for digits in [15, 5] {
+        let text = slanting(3000, 0.0, digits);
+        let file = read(&text).unwrap();
+        let g = mesh(&file);
+        assert_eq!((g.points.len(), g.types[0]), (3000, 5), "{digits}");
+        let filled = measure(g);
+        assert!(filled > 0.94 && filled < 1.001, "{digits}: {filled}");
+        let said = &file.warnings[0];
+        let plane = "in the plane with the normal (";
+        assert!(said.starts_with("3000 points in no order") && said.contains(plane), "{said}");
+        assert!(said.contains("0.000000, 0.800000, -0.600000") || digits < 15, "{said}");
+        // They lie in it, whatever the file rounds them to.
+        let at = |i: usize| g.points.get(i);
+        let normal = (0..2990).map(|i| (at(i + 1) - at(i)).cross(at(i + 2) - at(i)));
+        let normal = normal.max_by(|a, b| a.length().total_cmp(&b.length())).unwrap().normalize();
+        let off = (0..3000).map(|i| (at(i) - at(0)).dot(normal).abs()).fold(0.0, f64::max);
+        assert!(off < 1e-13, "{digits}: {off}");
+        let again = read(&shuffled(&text)).unwrap();
+        assert!(mesh(&again) == g && again.warnings == file.warnings, "{digits}");
+    }
+}
+
+#[test]
+fn points_nearly_in_a_plane_are_in_space_and_how_far_they_are_off_is_said() {
+    let file = read(&slanting(1000, 2e-3, 9)).unwrap();
+    assert_eq!(mesh(&file).types[0], 10);
+    let said = file.warnings.join("\n");
+    assert!(said.contains("they are nearly in a plane, but in none: the farthest is"), "{said}");
+    assert!(said.contains("and 1e-4 would do"), "{said}");
+    let file = read(&cloud(1000, 3)).unwrap();
+    assert!(!file.warnings.join("\n").contains("nearly"), "a cube is none");
+}
+
 #[test]
 fn what_has_no_mesh_is_refused_with_file_line_and_cure() {
     for (text, words) in [
         ("x,y,T\n0,0,1\n1,1,2\n", "2 different points, all on one line; give points"),
         ("x,y,z,T\n0,0,0,1\n1,1,1,2\n2,2,2,2\n3,3,3,1\n", "all on one line"),
-        ("x,y,z,T\n0,0,0,1\n1,0,1,2\n0,1,0,2\n1,1,1,1\n3,2,3,1\n", "slants to the axes; turn"),
         ("x,y,T\n1,1,1\n1,1,1\n", "1 different points, all on one line"),
         ("x,y,T\n,1,1\n", "0 different points"),
         ("x,y,T\n", "0 different points"),

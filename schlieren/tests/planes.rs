@@ -109,7 +109,8 @@ fn two_layers_of_cells_have_depth_of_their_own() {
     rho.extend_from_within(..N[0] * N[1]);
     let error = from_dataset(&Dataset::StructuredGrid(two), &options(Depth::Span(0.3)));
     let error = error.unwrap_err().to_string();
-    assert!(error.contains("leave it out: the data has depth of its own"), "{error}");
+    assert!(error.contains("the data has depth of its own: the farthest point is"), "{error}");
+    assert!(error.contains("up to 1e-4 is none; leave the depth out"), "{error}");
 }
 
 /// A case of cells along x and the radius, from the axis on, between two patches of type `wedge`

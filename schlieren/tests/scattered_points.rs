@@ -7,7 +7,7 @@ mod common;
 use bells::{BLOB, options, tetrahedra};
 use common::grid;
 use datasets::model::{Dataset, UnstructuredGrid};
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use rt_core::math::SplitMix64;
 use schlieren::input::{Depth, Medium, Options, Reference, contents, load, load_cells};
 use schlieren::march::{Medium as _, OnCells};
@@ -16,7 +16,7 @@ use schlieren::plan::{Plan, Request};
 use schlieren::view::{Axis, View};
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// A table of these points with the bell's values, in an order by chance.
 fn table(folder: &tempfile::TempDir, mut points: Vec<DVec3>) -> PathBuf {
@@ -166,5 +166,78 @@ fn a_table_with_a_radius_is_revolved() {
         let (other_eps, other_rho) = of(at);
         let slope = (other_eps - eps) / (other_rho - rho);
         assert!((2.2e-4..2.32e-4).contains(&slope), "{at:?}: {slope}");
+    }
+}
+
+/// Random points of 1.6 by 1 with a bell's density, placed by `place`. None are on lines, which
+/// rounding would bend to either side.
+fn cloud_in_plane(path: &Path, place: impl Fn(f64, f64) -> DVec3) {
+    let mut random = SplitMix64::new(11);
+    let density =
+        |x: f64, y: f64| 1.2 + 0.3 * (-((x - 0.7).powi(2) + (y - 0.4).powi(2)) / 0.04).exp();
+    let mut text = String::from("x,y,z,rho\n");
+    for _ in 0..6000 {
+        let [x, y] = [1.6, 1.0].map(|side| random.between(0.0, side));
+        let p = place(x, y);
+        writeln!(text, "{:?},{:?},{:?},{:?}", p.x, p.y, p.z, density(x, y)).unwrap();
+    }
+    std::fs::write(path, text).unwrap();
+}
+
+#[test]
+fn points_of_a_plane_that_slants_give_the_flow_in_the_plane_of_two_axes() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("plane.csv");
+    // Turned back by the least angle, it is as it was.
+    let span = DQuat::from_axis_angle(DVec3::new(0.6, 0.8, 0.0), 25f64.to_radians());
+    // About x, steeper than half of a right angle, and below the axis.
+    let about_x = |degrees: f64| DQuat::from_axis_angle(DVec3::X, degrees.to_radians());
+    let (steep, below) = (about_x(70.0), about_x(250.0));
+    let upright = about_x(90.0);
+    for (depth, turns) in
+        [(Depth::Span(0.3), vec![span]), (Depth::Revolve, vec![steep, below, upright])]
+    {
+        let options = Options { depth: Some(depth), ..Options::new(Medium::density("rho")) };
+        cloud_in_plane(&path, |x, y| DVec3::new(x, y, 0.0));
+        let flat = load(&path, &options).unwrap().field;
+        let largest = flat.eps().iter().fold(0.0f32, |m, e| m.max(e.abs()));
+        for turn in turns {
+            let case = format!("{depth:?} {turn}");
+            cloud_in_plane(&path, |x, y| turn * DVec3::new(x, y, 0.0));
+            let found = contents(&path, &Default::default()).unwrap();
+            assert!(found.planar, "{case}: {found:?}");
+            let made = load(&path, &options).unwrap();
+            assert_eq!(made.field.dims(), flat.dims(), "{case}");
+            assert!((made.field.origin_m() - flat.origin_m()).length() < 1e-9, "{case}");
+            // At the axis, rounding chooses which reflected points a polynomial is fitted to.
+            let [nx, ny, nz] = flat.dims();
+            let counts = |i: usize| {
+                let [j, k] = [(i / nx % ny, ny), (i / nx / ny, nz)]
+                    .map(|(at, n)| at as f64 - 0.5 * (n - 1) as f64);
+                depth != Depth::Revolve || j.hypot(k) > 3.0
+            };
+            let far = (0..nx * ny * nz)
+                .filter(|i| counts(*i))
+                .map(|i| (made.field.eps()[i] - flat.eps()[i]).abs());
+            let far = far.fold(0.0, f32::max) / largest;
+            assert!(far < 1e-4, "{case}: {far}");
+            let said = made.report.warnings.join("\n");
+            assert!(said.contains("it is turned by"), "{case}: {said}");
+        }
+    }
+}
+
+#[test]
+fn a_depth_of_points_nearly_in_a_plane_is_refused_with_how_far_they_are_off() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("bent.csv");
+    let turn = DQuat::from_axis_angle(DVec3::new(0.6, 0.8, 0.0), 0.4);
+    cloud_in_plane(&path, |x, y| turn * DVec3::new(x, y, 1e-3 * x * x));
+    for depth in [Depth::Span(0.3), Depth::Revolve] {
+        let options = Options { depth: Some(depth), ..Options::new(Medium::density("rho")) };
+        let error = load(&path, &options).map(|_| ()).unwrap_err();
+        let text = format!("{error}: {}", std::error::Error::source(&error).unwrap());
+        assert!(text.contains("bent.csv") && text.contains("the farthest point is"), "{text}");
+        assert!(text.contains("up to 1e-4 is none"), "{text}");
     }
 }

@@ -8,13 +8,15 @@ use crate::delaunay::gaps::{self, Gaps};
 use crate::delaunay::snap::Snapped;
 use crate::delaunay::{Degenerate, tetrahedra, triangles};
 use crate::model::{Attributes, Cells, Dataset, Points, UnstructuredGrid};
-use glam::DVec3;
+use crate::plane_of_points::{FLATNESS, Lie, lie};
+use glam::{DMat3, DVec3};
 
 /// Default of the width of a gap ([`dataset`]).
 pub const GAP_SPACINGS: f64 = gaps::SPACINGS;
 
-/// Side of a box by its longest one below which it is rounding, and the points lie in a plane.
-const FLAT: f64 = 1e-6;
+/// Points that are off a plane by less than this part of their box were probably meant to be in
+/// one.
+const NEARLY_FLAT: f64 = 0.02;
 
 /// VTK's types of a triangle and a tetrahedron.
 const TRIANGLE: u8 = 5;
@@ -28,6 +30,11 @@ pub struct PointsReport {
     pub points: usize,
     /// 2 in a plane, 3 in space.
     pub dimensions: usize,
+    /// The normal of their plane, of length 1, where it slants to the axes.
+    pub slanting_normal: Option<[f64; 3]>,
+    /// Distance of the point that is farthest from a plane that slants to the axes, by the longest
+    /// side of the points' box. In a plane up to 1e-4; zero in a plane of two axes.
+    pub off_plane: f64,
     /// Rows left out because a coordinate is missing.
     pub rows_without_place: usize,
     /// Rows at the place of another one; the point has their mean.
@@ -47,10 +54,11 @@ pub struct PointsReport {
 /// Converts a table to an unstructured grid by Delaunay triangulation. Cells that bridge a place
 /// without points are left out where it is `gap` times as wide as the cells around it; infinity
 /// keeps the whole convex hull. All columns of numbers become point arrays. Points are in the order
-/// of a Hilbert curve, so the mesh does not depend on the order of the rows.
+/// of a Hilbert curve, so the mesh does not depend on the order of the rows. Points of a plane that
+/// slants to the axes become triangles in it.
 ///
 /// # Errors
-/// If there is no x, a cell is not a number, or all points lie on a line or in a slanting plane.
+/// If there is no x, a cell is not a number, or all points lie on a line.
 ///
 /// ```
 /// use datasets::read::{csv, csv_points};
@@ -83,42 +91,59 @@ pub(crate) fn of_numbers(numbers: Numbers, gap: f64) -> Result<(Dataset, PointsR
     }
     drop((coordinates, rows));
 
-    // The axis that the points do not extend along comes last, for a triangulation in the plane.
     let fault = |what: String, cure: &str| {
         Fault::new(At::Field("the table".into()), what, cure).in_file(&path, FORMAT)
     };
     if u32::try_from(points.len()).is_err() {
         return Err(fault(format!("{} points are too many", points.len()), "thin them out"));
     }
-    let flat = flat_axis(&points);
+    let lie = lie(points.iter().copied().map(DVec3::from));
+    let flat = match lie {
+        Lie::Across(axis) => {
+            let low = points.iter().map(|p| p[axis]).fold(f64::INFINITY, f64::min);
+            points.iter_mut().for_each(|p| p[axis] = low);
+            Some((axis, DMat3::IDENTITY))
+        }
+        Lie::Slanting(plane) => {
+            points.iter_mut().for_each(|p| *p = plane.project(DVec3::from(*p)).to_array());
+            report.slanting_normal = Some(plane.normal.to_array());
+            report.off_plane = plane.off;
+            Some(plane.turn())
+        }
+        Lie::Space { off } => {
+            report.off_plane = off;
+            None
+        }
+        Lie::Line => None,
+    };
     report.dimensions = if flat.is_some() { 2 } else { 3 };
-    let turned = flat.map_or([0, 1, 2], |flat| [(flat + 1) % 3, (flat + 2) % 3, flat]);
-    if let Some(flat) = flat {
-        let low = points.iter().map(|p| p[flat]).fold(f64::INFINITY, f64::min);
-        points.iter_mut().for_each(|p| p[flat] = low);
-    }
-    let turned: Vec<[f64; 3]> = points.iter().map(|p| turned.map(|a| p[a])).collect();
+    let turned: Vec<[f64; 3]> = match flat {
+        // The axis across the plane comes last, and has one coordinate.
+        Some((axis, turn)) => {
+            let in_plane = |p: &[f64; 3]| {
+                let p = turn * DVec3::from(*p);
+                [p[(axis + 1) % 3], p[(axis + 2) % 3], 0.0]
+            };
+            points.iter().map(in_plane).collect()
+        }
+        None => points.clone(),
+    };
     let snapped = Snapped::new(&turned);
     drop(turned);
     let joined = join(&snapped, points, values, &mut report);
 
     // The cells.
-    let cells = match flat {
-        Some(_) => triangles(&snapped).map(|c| kept(&joined.places, &c, gap, &mut report)),
-        None => tetrahedra(&snapped).map(|c| kept(&joined.places, &c, gap, &mut report)),
+    let cells = match (lie, flat) {
+        (Lie::Line, _) => Err(Degenerate::Line),
+        (_, Some(_)) => triangles(&snapped).map(|c| kept(&joined.places, &c, gap, &mut report)),
+        _ => tetrahedra(&snapped).map(|c| kept(&joined.places, &c, gap, &mut report)),
     };
-    let cells = cells.map_err(|degenerate| {
-        let count = snapped.len();
-        match degenerate {
-            Degenerate::Line => fault(
-                format!("{count} different points, all on one line"),
-                "give points of a plane or of space, three or more",
-            ),
-            Degenerate::Plane => fault(
-                format!("{count} different points in a plane that slants to the axes"),
-                "turn them into the plane of x and y, and leave z out",
-            ),
-        }
+    // Points that are in no plane are in none as integers either.
+    let cells = cells.map_err(|(Degenerate::Line | Degenerate::Plane)| {
+        fault(
+            format!("{} different points, all on one line", snapped.len()),
+            "give points of a plane or of space, three or more",
+        )
     })?;
     let mut has_cell = vec![false; snapped.len()];
     cells.connectivity().iter().for_each(|p| has_cell[*p as usize] = true);
@@ -135,19 +160,6 @@ pub(crate) fn of_numbers(numbers: Numbers, gap: f64) -> Result<(Dataset, PointsR
         ..UnstructuredGrid::default()
     };
     Ok((Dataset::UnstructuredGrid(grid), report))
-}
-
-/// The axis along which the points extend by no more than rounding.
-fn flat_axis(points: &[[f64; 3]]) -> Option<usize> {
-    let side = [0, 1, 2].map(|a| {
-        let along = points.iter().map(|p| p[a]);
-        let (low, high) =
-            along.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
-        0.5 * high - 0.5 * low
-    });
-    let longest = side.into_iter().fold(0.0, f64::max);
-    // z rather than the others, should the points be on a line.
-    (0..3).rev().find(|a| side[*a] <= FLAT * longest || points.is_empty())
 }
 
 /// Places with one point each.
@@ -215,9 +227,12 @@ fn kept<const N: usize>(
 impl PointsReport {
     /// What was found and done, one sentence each. `gap` is the option that made it.
     pub(crate) fn sentences(&self, gap: f64) -> Vec<String> {
-        let (kind, place) = match self.dimensions {
-            2 => ("triangles", "in a plane"),
-            _ => ("tetrahedra", "in space"),
+        let (kind, place) = match (self.dimensions, self.slanting_normal) {
+            (2, None) => ("triangles", "in a plane".into()),
+            (2, Some([x, y, z])) => {
+                ("triangles", format!("in the plane with the normal ({x:.6}, {y:.6}, {z:.6})"))
+            }
+            _ => ("tetrahedra", "in space".into()),
         };
         let mut found = vec![format!(
             "{} points in no order {place} became {} {kind} by Delaunay triangulation; {} more, \
@@ -238,6 +253,14 @@ impl PointsReport {
         );
         add(self.missing_values, "values are missing and stay without a number (NaN)");
         add(self.lonely_points, "points are in no cell: there are none near them");
+        if self.dimensions == 3 && self.off_plane < NEARLY_FLAT {
+            found.push(format!(
+                "they are nearly in a plane, but in none: the farthest is {:.2e} of their longest \
+                 side off, and {FLATNESS:e} would do; where they are a plane, write their \
+                 coordinates with more digits, or leave out rows that are not of it",
+                self.off_plane
+            ));
+        }
         found
     }
 }

@@ -1,14 +1,12 @@
 //! Gives depth to polygons in a plane: slices of unstructured meshes, and two-dimensional cases.
 
 use crate::model::{CellType, Cells, Dataset, Points, PolyData, UnstructuredGrid, extent_dims};
+use crate::plane_of_points::FLATNESS;
 use glam::DVec3;
 
 const HEXAHEDRON: u8 = 12;
 const WEDGE: u8 = 13;
 const POLYHEDRON: u8 = 42;
-
-/// Points that deviate more from the plane, relative to its size, do not lie in one.
-const FLATNESS: f64 = 1e-4;
 
 /// Prisms over polygons.
 pub(super) struct Extruded {

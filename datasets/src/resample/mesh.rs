@@ -11,6 +11,7 @@ mod topology;
 
 use super::{ResampleError, extrude};
 use crate::model::{Attributes, CellType, Dataset, Points, UnstructuredGrid, extent_dims};
+use crate::plane_of_points::{Lie, lie};
 pub(super) use faces::{HIDDEN, NO_FACE, Neighbours, OUTSIDE, WALL};
 use glam::{DMat3, DVec3};
 use layers::{flat_source, hidden_cells_of_lattice, plane_normal};
@@ -110,6 +111,21 @@ pub enum Plane {
         /// Length, in the unit of the mesh.
         span: f64,
     },
+    /// Half a plane of an axisymmetric flow, as thin as this. One that lies along the x axis is
+    /// turned about it until y is the radius, whatever direction it slants to.
+    Meridian {
+        /// Length, in the unit of the mesh.
+        thickness: f64,
+    },
+}
+
+impl Plane {
+    fn depth(self) -> f64 {
+        match self {
+            Plane::Extrude { span } => span,
+            Plane::Meridian { thickness } => thickness,
+        }
+    }
 }
 
 impl Mesh {
@@ -122,17 +138,20 @@ impl Mesh {
     /// As [`Self::new`], with depth for data in a plane, and for one layer of cells instead of its
     /// thickness. Other three-dimensional data is rejected. A plane that slants to the axes is
     /// turned onto two of them ([`Self::turn`]).
+    ///
+    /// # Errors
+    /// If the data is not consistent, has no plane, or is in none; or the depth is not above 0.
     pub fn with_plane(data: &Dataset, plane: Plane) -> Result<Mesh, ResampleError> {
         Self::build(data, Some(plane))
     }
 
     fn build(data: &Dataset, plane: Option<Plane>) -> Result<Mesh, ResampleError> {
         data.check()?;
-        if let Some(Plane::Extrude { span }) = plane
-            && !(span > 0.0 && span.is_finite())
+        if let Some(depth) = plane.map(Plane::depth)
+            && !(depth > 0.0 && depth.is_finite())
         {
             let cure = "give a positive length in the unit of the mesh";
-            return Err(ResampleError::Option { option: "span", value: span, cure });
+            return Err(ResampleError::Option { option: "span", value: depth, cure });
         }
         let mut mesh = Mesh {
             points: vec![],
@@ -155,7 +174,7 @@ impl Mesh {
             flat += usize::from(is_flat && of_leaves == plane);
             mesh.parts[before..].iter_mut().for_each(|p| p.leaf = number);
             mesh.add_baffles(leaf, before);
-            let Some(Plane::Extrude { span }) = plane else { continue };
+            let Some(span) = plane.map(Plane::depth) else { continue };
             for part in before..mesh.parts.len() {
                 if mesh.parts[part].depth.is_none() && mesh.stretch_layer(part, span) {
                     flat += 1;
@@ -177,13 +196,16 @@ impl Mesh {
             return Err(ResampleError::NoVolume { kind: data.kind(), found, cure });
         }
         if plane.is_some() && flat == 0 {
+            if let Lie::Space { off } = lie(mesh.points.iter().copied().filter(|p| p.is_finite())) {
+                return Err(ResampleError::NotFlat { off });
+            }
             return Err(ResampleError::Option {
                 option: "span",
                 value: 0.0,
                 cure: "leave it out: the data has depth of its own",
             });
         }
-        mesh.turn_to_axes();
+        mesh.turn_to_axes(plane);
         Ok(mesh)
     }
 
@@ -237,7 +259,7 @@ impl Mesh {
         let mut dims = dims;
         let mut normal = DVec3::Z;
         if is_flat {
-            let Some(Plane::Extrude { span }) = plane else {
+            let Some(span) = plane.map(Plane::depth) else {
                 self.left_out += count;
                 return Ok(true);
             };
@@ -324,7 +346,7 @@ impl Mesh {
         first_cell: u32,
         plane: Option<Plane>,
     ) -> Result<bool, ResampleError> {
-        let span = plane.map_or(1.0, |Plane::Extrude { span }| span);
+        let span = plane.map_or(1.0, Plane::depth);
         let Some(prisms) = extrude::extruded(d, span) else {
             self.left_out += d.cells.len();
             return Ok(false);

@@ -40,6 +40,7 @@ pub use smooth::smooth;
 pub use walls::Walls;
 
 use crate::model::ModelError;
+use crate::plane_of_points::FLATNESS;
 use glam::DVec3;
 use reconstruct::{PointField, Symmetry};
 
@@ -56,6 +57,17 @@ pub enum ResampleError {
         found: String,
         /// What to do.
         cure: &'static str,
+    },
+    /// Data in no plane got a depth.
+    #[error(
+        "a depth is given, a span or a revolution, but the data has depth of its own: the farthest \
+         point is {off:.2e} of their longest side off a plane, and up to {FLATNESS:e} is none; \
+         leave the depth out, or save a slice"
+    )]
+    NotFlat {
+        /// Distance of the farthest point from the plane of the largest triangle, by the longest
+        /// side of the box.
+        off: f64,
     },
     /// The requested lattice is impossible.
     #[error("a lattice of {0}x{1}x{2} nodes: {what}", dims[0], dims[1], dims[2])]

@@ -75,14 +75,18 @@ impl SamplePoints {
     }
 
     /// What was done to a plane that slants to the axes, in words.
-    pub(super) fn turn_warning(&self) -> Option<String> {
+    pub(super) fn turn_warning(&self, options: &Options) -> Option<String> {
         let SamplePoints::Mesh { mesh, .. } = self else { return None };
         let turn = mesh.turn()?;
         let (axis, angle) = DQuat::from_mat3(&turn).to_axis_angle();
         let across = mesh.axis_of_depth().map_or("", |a| ["x", "y", "z"][a]);
+        let plane = match options.depth {
+            Some(Depth::Revolve) => "not in the plane of x and y, the radius",
+            _ => "in a plane that slants to the axes",
+        };
         Some(format!(
-            "the flow is in a plane that slants to the axes: it is turned by {:.3} degrees about \
-             ({:.3}, {:.3}, {:.3}) at the origin, so that it lies across {across}; views, bounds \
+            "the flow is {plane}: it is turned by {:.3} degrees about ({:.3}, {:.3}, {:.3}) \
+             at the origin, so that it lies across {across}; views, bounds \
              and bodies are those of the turned flow",
             angle.to_degrees(),
             axis.x,
@@ -213,7 +217,7 @@ impl SamplePoints {
 fn mesh_of(data: &Dataset, options: &Options) -> Result<Mesh, InputError> {
     Ok(match options.depth {
         Some(Depth::Span(span)) => Mesh::with_plane(data, Plane::Extrude { span })?,
-        Some(Depth::Revolve) => Mesh::with_plane(data, Plane::Extrude { span: sheet(data) })?,
+        Some(Depth::Revolve) => Mesh::with_plane(data, Plane::Meridian { thickness: sheet(data) })?,
         None => Mesh::new(data)?,
     })
 }

@@ -333,7 +333,7 @@ pub fn from_dataset(data: &Dataset, options: &Options) -> Result<LoadedField, In
 
     // n − 1 at the points of the file, less a common background.
     let points = lattice::SamplePoints::find(data, options)?;
-    report.warnings.extend(points.turn_warning());
+    report.warnings.extend(points.turn_warning(options));
     report.warnings.extend(points.hidden_warning(options));
     let columns = options.medium.columns(data, &points)?;
     let mut index = evaluate::evaluate(&columns, options, &mut report)?;

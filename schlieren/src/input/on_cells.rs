@@ -36,7 +36,7 @@ pub fn cells_from_dataset(
     refuse_lattice_options(options)?;
     let mut report = Report::default();
     let points = SamplePoints::on_cells(data, options)?;
-    report.warnings.extend(points.turn_warning());
+    report.warnings.extend(points.turn_warning(options));
     report.warnings.extend(points.hidden_warning(options));
     let columns = options.medium.columns(data, &points)?;
     let mut index = evaluate::evaluate(&columns, options, &mut report)?;

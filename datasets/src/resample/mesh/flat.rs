@@ -1,7 +1,7 @@
 //! Planes as meshes: cells of one layer become as thick as the span of their flow, and a plane that
 //! slants to the axes is turned onto two of them.
 
-use super::{Mesh, PartDepth};
+use super::{Mesh, PartDepth, Plane};
 use glam::{DMat3, DQuat, DVec3};
 
 /// Corners of one layer of cells lie in its two sides within this part of the mesh's size, and of
@@ -83,22 +83,42 @@ impl Mesh {
     }
 
     /// Turns a plane that slants to the axes, about the origin and by the least angle, so that two
-    /// of them lie along it. Without depth, or with planes of several directions, the mesh stays.
-    pub(super) fn turn_to_axes(&mut self) {
+    /// of them lie along it; one to revolve that lies along x is turned about x, so that y is the
+    /// radius. Without depth, or with planes of several directions, the mesh stays.
+    pub(super) fn turn_to_axes(&mut self, plane: Option<Plane>) {
         let Some(first) = self.parts.first().filter(|p| p.depth.is_some()) else { return };
         let normal = forward(first.normal);
         let is_along = |p: &super::Part| {
             p.depth.is_some() && p.normal.dot(normal).abs() > 1.0 - OF_SIZE * OF_SIZE
         };
-        let axis = normal.abs().max_position();
-        if normal[axis] > 1.0 - ALONG || !normal.is_normalized() || !self.parts.iter().all(is_along)
-        {
+        if !normal.is_normalized() || !self.parts.iter().all(is_along) {
             return;
         }
-        let turn = DMat3::from_quat(DQuat::from_rotation_arc(normal, DVec3::AXES[axis]));
+        let is_meridian =
+            matches!(plane, Some(Plane::Meridian { .. })) && normal.x.abs() <= OF_SIZE;
+        let axis = if is_meridian { 2 } else { normal.abs().max_position() };
+        if normal[axis] > 1.0 - ALONG {
+            return;
+        }
+        let turn = match is_meridian {
+            true => self.turn_about_x(normal),
+            false => DMat3::from_quat(DQuat::from_rotation_arc(normal, DVec3::AXES[axis])),
+        };
         self.points.iter_mut().for_each(|p| *p = turn * *p);
         self.parts.iter_mut().for_each(|p| p.normal = DVec3::AXES[axis]);
         self.turn = Some(turn);
+    }
+
+    /// The rotation about x that brings a plane along x with this normal across z, and that side of
+    /// it to which it extends farther to positive y.
+    fn turn_about_x(&self, normal: DVec3) -> DMat3 {
+        let radial = DVec3::X.cross(normal).normalize_or(DVec3::Y);
+        let reach = |side: f64| {
+            let along = self.points.iter().map(|p| side * p.dot(radial));
+            along.filter(|r| r.is_finite()).fold(f64::NEG_INFINITY, f64::max)
+        };
+        let radial = if reach(1.0) >= reach(-1.0) { radial } else { -radial };
+        DMat3::from_cols(DVec3::X, radial, DVec3::X.cross(radial)).transpose()
     }
 
     /// The rotation about the origin that brought a plane that slants to the axes onto two of them;
