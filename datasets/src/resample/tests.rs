@@ -234,6 +234,34 @@ fn hidden_and_nan_cells_are_distinguished() {
 }
 
 #[test]
+fn cells_without_a_value_are_no_neighbours_as_hidden_ones() {
+    let bell = |p: DVec3| (-(p - 6.0).length_squared() / 18.0).exp();
+    let is_missing = |c: usize| (c % 12) / 4 == 1 && (c / 12 % 12) > 4 && c / 144 < 7;
+    let values: Vec<f64> = (0..12usize.pow(3))
+        .map(|c| bell(DVec3::new((c % 12) as f64, (c / 12 % 12) as f64, (c / 144) as f64) + 0.5))
+        .collect();
+    let resampled = |hide: bool| {
+        let mut image = ImageData::new([13; 3], DVec3::ZERO, DVec3::ONE);
+        let mut values = values.clone();
+        if hide {
+            let ghost = (0..values.len()).map(|c| 32 * u8::from(is_missing(c))).collect();
+            image.attributes.cell.push(DataArray::new("vtkGhostType", 1, Values::U8(ghost)));
+        } else {
+            values.iter_mut().enumerate().filter(|v| is_missing(v.0)).for_each(|v| *v.1 = f64::NAN);
+        }
+        let mesh = Mesh::new(&Dataset::ImageData(image)).unwrap();
+        let lattice = lattice_of(&mesh, Resolution::Dims([40; 3]));
+        resample(&mesh, Samples::Cells(&values), &lattice, &Options::default()).unwrap()
+    };
+    let (hidden, missing) = (resampled(true), resampled(false));
+    for (i, (a, b)) in hidden.values.iter().zip(&missing.values).enumerate() {
+        assert_eq!(a.to_bits(), b.to_bits(), "node {i}: {a} {b}");
+    }
+    let of = |m: &Mark| if *m == Mark::Hidden { Mark::NotFinite } else { *m };
+    assert!(hidden.marks.iter().map(of).eq(missing.marks.iter().copied()));
+}
+
+#[test]
 fn overlapping_blocks_fill_each_others_holes() {
     let mut holed = ImageData::new([3, 3, 3], DVec3::ZERO, DVec3::ONE);
     holed.attributes.cell.push(DataArray::new(

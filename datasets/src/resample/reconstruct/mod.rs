@@ -109,7 +109,7 @@ impl<'a> PointField<'a> {
 
     /// Fits polynomials to values at points.
     pub(super) fn of_points(mesh: &Mesh, values: &'a [f64], symmetry: Symmetry) -> PointField<'a> {
-        let incidence = Incidence::of(mesh);
+        let incidence = Incidence::of(mesh, None);
         let fit = |point: usize, around: &mut Neighbourhood, fit: &mut Fit| {
             around.points(mesh, &incidence, point);
             fit.over_points(mesh, values, point, around, symmetry)
@@ -125,7 +125,7 @@ impl<'a> PointField<'a> {
         values: &'a [f64],
         symmetry: Symmetry,
     ) -> PointField<'a> {
-        let incidence = Incidence::of(mesh);
+        let incidence = Incidence::of(mesh, Some(cells));
         let moments = CellMoments::of(mesh, symmetry);
         let fit = |point: usize, around: &mut Neighbourhood, fit: &mut Fit| {
             around.cells(mesh, &incidence, &moments, point);

@@ -16,11 +16,15 @@ pub(super) struct Incidence {
 }
 
 impl Incidence {
-    /// Hidden cells are left out: their values are not those of the flow.
-    pub(super) fn of(mesh: &Mesh) -> Incidence {
+    /// Hidden cells are left out: their values are not those of the flow. So are cells without a
+    /// value, if `averages` are those of cells: they would be counted among the neighbours, and
+    /// what is behind them with them.
+    pub(super) fn of(mesh: &Mesh, averages: Option<&[f64]>) -> Incidence {
         let same = mesh.first_at_place().to_vec();
+        let is_of_flow =
+            |cell: usize| !mesh.is_hidden(cell) && averages.is_none_or(|v| v[cell].is_finite());
         let of_cell = |cell: usize| {
-            let ids = if mesh.is_hidden(cell) { SmallVec::new() } else { mesh.corners(cell).ids };
+            let ids = if is_of_flow(cell) { mesh.corners(cell).ids } else { SmallVec::new() };
             ids.into_iter().map(|id| same[id as usize]).collect::<Vec<u32>>()
         };
         // In pieces, because a list for each cell takes more memory than the rows.
