@@ -12,10 +12,10 @@ use rayon::prelude::*;
 /// Up to the first number, the third difference of averages, as a part of their largest first one,
 /// is that of a smooth field: a bell with a width of two cells has 0.54. From the second on, it is
 /// that of a step, next to which it is 1 or more.
-const ROUGHNESS: [f64; 2] = [0.55, 0.9];
+pub(super) const ROUGHNESS: [f64; 2] = [0.55, 0.9];
 /// As much at the ends of a row, where values go beyond the averages: a step over two cells there
 /// may have 0.33.
-const ROUGHNESS_AT_ENDS: [f64; 2] = [0.1, 0.3];
+pub(super) const ROUGHNESS_AT_ENDS: [f64; 2] = [0.1, 0.3];
 
 /// How far the value at an end may be from the last average, by the difference of the last two. On
 /// a line it is 0.5.
@@ -111,7 +111,7 @@ fn at_corner(corner: usize, n: usize, average: impl Fn(usize) -> f64) -> f64 {
 
 /// 1 where four averages are those of a smooth field, 0 at a step.
 #[inline]
-fn smoothness([a, b, c, d]: [f64; 4], [smooth, step]: [f64; 2]) -> f64 {
+pub(super) fn smoothness([a, b, c, d]: [f64; 4], [smooth, step]: [f64; 2]) -> f64 {
     let first = (b - a).abs().max((c - b).abs()).max((d - c).abs());
     let third = ((d - a) - 3.0 * (c - b)).abs();
     // Equal averages have no step.

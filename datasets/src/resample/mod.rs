@@ -14,6 +14,7 @@
 //! back at the points of the mesh.
 
 mod beyond_border;
+mod centre_values;
 mod corner_values;
 mod extrude;
 mod face_tree;
@@ -29,6 +30,7 @@ mod smooth;
 mod walls;
 
 pub use beyond_border::in_bodies;
+pub use centre_values::centre_values;
 pub use corner_values::corner_values;
 pub use jumps::{JumpReport, average_jumps};
 pub use mesh::{Mesh, Plane};

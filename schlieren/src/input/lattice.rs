@@ -3,8 +3,8 @@
 use super::{Depth, InputError, Options};
 use datasets::model::{Attributes, ColorBy, Dataset, extent_dims};
 use datasets::resample::{
-    self, Lattice, Mark, Mesh, Plane, Report, Resolution, Samples, Walls, corner_values, in_bodies,
-    resample as resample_mesh, revolve, revolved_bounds,
+    self, Lattice, Mark, Mesh, Plane, Report, Resolution, Samples, Walls, centre_values,
+    corner_values, in_bodies, resample as resample_mesh, revolve, revolved_bounds,
 };
 use glam::{DMat3, DQuat, DVec3};
 
@@ -30,6 +30,9 @@ pub(super) struct LatticeValues {
     pub(super) truncation: Vec<f32>,
     pub(super) marks: Vec<Mark>,
     pub(super) report: Option<Report>,
+    /// Whether the nodes are the centres of the file's cells, so that half a cell is left out at
+    /// each side.
+    pub(super) at_centres: bool,
 }
 
 /// Number of nodes along the span of a two-dimensional flow: enough for the border of any
@@ -175,19 +178,22 @@ impl SamplePoints {
         options: &Options,
     ) -> Result<LatticeValues, InputError> {
         match self {
-            SamplePoints::Uniform { lattice, per_point, .. } => {
-                // Where a cell has no value, its centre is a node: the border of a body at the
-                // cell's faces is then midway between nodes, and in its place.
+            SamplePoints::Uniform { lattice: points, per_point, .. } => {
+                // Where a cell has no value, the centres of cells are nodes: the border of a body
+                // at the cell's faces is then midway between nodes, and in its place.
                 let (lattice, values) = match (per_point, values.iter().all(|v| v.is_finite())) {
-                    (true, _) => (*lattice, values),
-                    (false, true) => (*lattice, corner_values(cells_of(lattice), &values)),
-                    (false, false) => (cell_centres(lattice), values),
+                    (true, _) => (*points, values),
+                    (false, true) => (*points, corner_values(cells_of(points), &values)),
+                    (false, false) => {
+                        (cell_centres(points), centre_values(cells_of(points), &values))
+                    }
                 };
                 let values: Vec<f32> = values.into_iter().map(|v| v as f32).collect();
                 let mark = |v: &f32| if v.is_finite() { Mark::Inside } else { Mark::NotFinite };
                 let marks = values.iter().map(mark).collect();
                 let truncation = vec![];
-                Ok(LatticeValues { lattice, values, truncation, marks, report: None })
+                let at_centres = !per_point && lattice.dims != points.dims;
+                Ok(LatticeValues { lattice, values, truncation, marks, report: None, at_centres })
             }
             SamplePoints::Mesh { mesh, per_point, own } => {
                 let lattice = target(mesh, own.as_ref(), options)?;
@@ -207,6 +213,7 @@ impl SamplePoints {
                     truncation: r.truncation,
                     marks: r.marks,
                     report: Some(r.report),
+                    at_centres: own.is_some_and(|own| lattice == cell_centres(&own)),
                 })
             }
         }
@@ -233,7 +240,9 @@ fn target(mesh: &Mesh, own: Option<&Lattice>, options: &Options) -> Result<Latti
         && options.depth.is_none()
         && let Some(own) = own
     {
-        return Ok(*own);
+        // As where cells have no value: the border of a hidden cell is midway between nodes.
+        let is_thick = own.dims.iter().all(|n| *n > 2);
+        return Ok(if mesh.num_hidden() > 0 && is_thick { cell_centres(own) } else { *own });
     }
     let (whole_low, whole_high) = (low, high);
     let (low, high) = match options.bounds {

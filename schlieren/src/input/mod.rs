@@ -348,6 +348,14 @@ pub fn from_dataset(data: &Dataset, options: &Options) -> Result<LoadedField, In
         ));
     }
     report.resampling = on.report;
+    if on.at_centres {
+        report.warnings.push(
+            "cells are hidden or have no value: the nodes of the lattice are the centres of the \
+             cells, so that bodies end at the cells' faces, and half a cell at each side of the \
+             flow is left out; flow.on_cells traces whole cells"
+                .into(),
+        );
+    }
     if options.average_jumps {
         let found = resample::average_jumps(&mut on.values, on.lattice.dims)?;
         report.warnings.extend(jumps_warning(&found));
