@@ -63,7 +63,7 @@ pub enum ResampleError {
     /// Data in no plane got a depth.
     #[error(
         "a depth is given, a span or a revolution, but the data has depth of its own: the farthest \
-         point is {off:.2e} of their longest side off a plane, and up to {FLATNESS:e} is none; \
+         point is {off:.2e} of its longest side off a plane, and up to {FLATNESS:e} is none; \
          leave the depth out, or save a slice"
     )]
     NotFlat {

@@ -3,7 +3,7 @@
 //! ```text
 //! byte 0     header: 128 bytes
 //!   0        the letters RTSVMESH
-//!   8        u32 version (3), u32 checksum of the header with zero in this place
+//!   8        u32 version (5), u32 checksum of the header with zero in this place
 //!   16       u64 length of the file, u64 byte of the table, u64 pages, u64 triangles,
 //!            u64 triangles that were left out
 //!   56       3 f64 origin
@@ -20,6 +20,7 @@
 //! ```
 //!
 //! Versions 1 and 2 had the numbers of meshlets in another order, and version 1 no attributes.
+//! Versions 3 and 4 had other headers of meshlets.
 //!
 //! Checksums are CRC-32 (IEEE 802.3). The header is written last: a file without it was not
 //! finished.

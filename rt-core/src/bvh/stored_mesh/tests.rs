@@ -184,7 +184,7 @@ fn bytes_that_were_cut_or_are_something_else_are_refused() {
     }
     let longer = [&whole[..], &[0]].concat();
     assert!(open(&longer).expect("more bytes").contains("bytes, but the header says"));
-    for version in [1, 2, 3] {
+    for version in [1, 2, 3, 4] {
         let mut other = whole.clone();
         other[8] = version;
         let error = open(&other).expect("another version");
