@@ -174,7 +174,8 @@ impl<'a> CellWalker<'a> {
 
     /// The pieces, from and to, of the line from `at` in `direction`, of length one, up to `length`
     /// that lie in no hidden cell. The line is one outside the cells with values; `ends_hidden`
-    /// says whether it begins and ends at a hidden cell. `slack` is how far `at` may be beyond a face.
+    /// says whether it begins and ends at a hidden cell. `slack` is how far `at` may be beyond a
+    /// face.
     pub fn beside_hidden(
         &self,
         at: DVec3,
