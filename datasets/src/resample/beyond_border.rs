@@ -82,11 +82,16 @@ impl Nearest<'_> {
     fn add(&mut self, p: DVec3, is_wall: bool) {
         let dims = self.lattice.dims;
         let at = (p - self.lattice.origin) / self.lattice.spacing;
+        if !at.is_finite() {
+            return;
+        }
         // Nodes at one step too: beside a face through nodes, these are the nearest on either side.
+        // A face may be farther from the lattice than integers reach.
         let beside = |a: usize| {
-            let [first, last] = [(at[a] - STEP_BESIDE).ceil(), (at[a] + STEP_BESIDE).floor()];
-            let last = last.min(dims[a] as f64 - 1.0);
-            (first.max(0.0) as usize..).take_while(move |i| *i as f64 <= last)
+            let first = (at[a] - STEP_BESIDE).ceil().max(0.0);
+            let last = (at[a] + STEP_BESIDE).floor().min(dims[a] as f64 - 1.0);
+            let some = (first <= last).then(|| first as usize..=last as usize);
+            some.into_iter().flatten()
         };
         for (k, j) in beside(2).flat_map(|k| beside(1).map(move |j| (k, j))) {
             for i in beside(0) {
@@ -281,6 +286,21 @@ mod tests {
         let body = in_bodies(&mesh, &walls, &lattice, &field.marks, false);
         let outside = field.marks.iter().filter(|m| **m == Mark::Outside).count();
         assert!(outside > 50 && body.iter().filter(|b| **b).count() == outside, "{outside}");
+    }
+
+    #[test]
+    fn faces_farther_away_than_integers_reach_are_beside_no_node() {
+        let lattice =
+            Lattice { dims: [3; 3], origin: DVec3::ZERO, spacing: DVec3::new(1.0, 1.0, 1e-300) };
+        let (distance2, is_wall) = (vec![f32::INFINITY; 27], vec![false; 27]);
+        let mut nearest =
+            Nearest { lattice: &lattice, marks: &[Mark::Outside; 27], distance2, is_wall };
+        for x in [1e30, -1e30, f64::MAX, f64::NAN, f64::INFINITY] {
+            nearest.add(DVec3::splat(x), true);
+        }
+        assert!(nearest.is_wall.iter().all(|wall| !wall));
+        nearest.add(DVec3::new(1.2, 1.0, 1e-300), true);
+        assert_eq!(nearest.is_wall.iter().filter(|wall| **wall).count(), 2 * 3 * 3);
     }
 
     #[test]
