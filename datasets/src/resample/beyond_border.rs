@@ -90,7 +90,7 @@ impl Nearest<'_> {
         let beside = |a: usize| {
             let first = (at[a] - STEP_BESIDE).ceil().max(0.0);
             let last = (at[a] + STEP_BESIDE).floor().min(dims[a] as f64 - 1.0);
-            let some = (first <= last).then(|| first as usize..=last as usize);
+            let some = (first <= last).then_some(first as usize..=last as usize);
             some.into_iter().flatten()
         };
         for (k, j) in beside(2).flat_map(|k| beside(1).map(move |j| (k, j))) {
