@@ -47,6 +47,7 @@ pub(crate) struct RayTask<'r, L> {
 }
 
 /// A ray under way.
+#[derive(Clone, Copy)]
 struct Lane<'r, L> {
     ray: &'r RaySetup,
     skip_t: f32,
@@ -217,10 +218,13 @@ pub(crate) fn traverse_interleaved<'r, const N: usize, S: Simd, Q: RayQueue<'r, 
                 *lane = Lane::new(units, task, stack);
                 i += 1;
             } else {
-                // The last ray moves to the free place.
+                // The last ray moves to the free place. By a swap, which writes both, rays of
+                // ambient occlusion took 1.07 times as long in a compact tree.
                 under_way -= 1;
-                lanes.swap(i, under_way);
-                stacks.swap(i, under_way);
+                if i < under_way {
+                    lanes[i] = lanes[under_way];
+                    stacks.swap(i, under_way);
+                }
             }
         }
         if i >= under_way {
