@@ -60,7 +60,8 @@ fn check_meshlet(words: &[u32]) -> Result<(), &'static str> {
     let header = Header::read(words);
     let in_range = header.nodes as usize <= MAX_NODES
         && header.leaves as usize <= MAX_LEAVES
-        && header.id_bits <= u32::BITS
+        && header.numbers.range_bits <= u32::BITS
+        && header.numbers.number_bits() <= u32::BITS
         && header.index_bits <= MAX_INDEX_BITS
         && header.lattice.exponents.iter().all(|e| EXPONENTS.contains(e))
         && header.axes.iter().all(|axis| axis.bits <= u32::BITS)
@@ -85,6 +86,11 @@ fn check_meshlet(words: &[u32]) -> Result<(), &'static str> {
             if bits::read(words, at, header.index_bits) >= header.vertices {
                 return Err("a triangle has a vertex that does not exist");
             }
+        }
+        let at = at + (3 * header.index_bits) as usize;
+        let number = bits::read(words, at, header.numbers.number_bits());
+        if header.numbers.group(number.into()) >= header.numbers.groups {
+            return Err("the number of a triangle is in a group that does not exist");
         }
     }
     for vertex in 0..header.vertices {
@@ -140,4 +146,71 @@ fn check_nodes(words: &[u32], header: &Header) -> Result<usize, &'static str> {
     // Of the last node, rays read as much as eight children have.
     let end = at.max(last + 1 + PLANE_WORDS);
     if end > words.len() { Err("the nodes of a meshlet end outside") } else { Ok(at) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bvh::build::UNWATCHED;
+    use crate::bvh::compact::CompactBvh;
+    use crate::bvh::layout::local_frame::LocalFrame;
+    use crate::bvh::options::BuildQuality;
+    use crate::mesh::TriMesh;
+    use glam::Vec3;
+
+    /// A lattice of quadrilaterals, row by row, of which each is two triangles.
+    fn sheet(cells: u32) -> TriMesh {
+        let mut mesh = TriMesh::default();
+        for i in 0..(cells + 1) * (cells + 1) {
+            let (x, y) = ((i % (cells + 1)) as f32, (i / (cells + 1)) as f32);
+            mesh.positions.push(Vec3::new(x, y, (0.3 * x).sin()));
+        }
+        for i in 0..cells * cells {
+            let a = i / cells * (cells + 1) + i % cells;
+            let c = a + cells + 1;
+            mesh.indices.extend([[a, a + 1, c], [c, a + 1, c + 1]]);
+        }
+        mesh
+    }
+
+    /// The units of a tree, and the first unit of a meshlet whose triangles would need as many bits
+    /// with one group less.
+    fn tree() -> (Vec<Unit>, usize) {
+        let mesh = sheet(16);
+        let frame = LocalFrame::around(mesh.origin, 32.0);
+        let tree = CompactBvh::build(mesh.triangles(), &frame, BuildQuality::Balanced, &UNWATCHED);
+        let Ok(tree) = tree else { panic!("nobody stops it") };
+        let units = tree.bvh.units;
+        let nodes = units[..].chunks_exact(NODE_UNITS).take(1);
+        let leaves = nodes.flat_map(|node| node[CHILD_ROW].bits().map(ChildRef));
+        let mut meshlets = leaves.filter(|child| child.is_leaf()).map(|child| child.unit());
+        let meshlet = meshlets.find(|&at| {
+            let groups = Header::read(bytemuck::cast_slice(&units[at..])).numbers.groups;
+            groups > 2 && bits::width(groups - 1) == bits::width(groups - 2)
+        });
+        (units, meshlet.expect("a meshlet with several groups"))
+    }
+
+    #[test]
+    fn headers_that_contradict_what_follows_them_are_refused_by_what_is_wrong() {
+        let (sound, meshlet) = tree();
+        assert!(check_units(&sound).is_ok());
+        let header = Header::read(bytemuck::cast_slice(&sound[meshlet..]));
+        // A word of the header, the bits that are cleared, those that are set, and the reason.
+        let cases = [
+            (0, 63 << 23, 33 << 23, "out of range"),
+            (0, 63, header.triangles - 2, "do not agree"),
+            (0, 255 << 6, 0, "a vertex that does not exist"),
+            (9, 63 << 25, (header.numbers.groups - 2) << 25, "a group that does not exist"),
+            (9, 127 << 18, 0, "do not end where"),
+            (10, 31 << 24, 31 << 24, "out of range"),
+        ];
+        for (word, cleared, set, reason) in cases {
+            let mut units = sound.clone();
+            let words: &mut [u32] = bytemuck::cast_slice_mut(&mut units[meshlet..]);
+            words[word] = words[word] & !cleared | set;
+            let error = check_units(&units).expect_err(reason);
+            assert!(error.contains(reason), "word {word}: {error}, not {reason}");
+        }
+    }
 }

@@ -4,6 +4,7 @@ use super::bits;
 use super::cut::MAX_LEAVES;
 use super::meshlet::{Header, Sections};
 use super::place::TrianglePlace;
+use super::triangle_numbers::TriangleNumbers;
 use crate::bvh::layout::triangles::{TRI_LEAF_UNITS, leaf_floats, leaf_triangle_ids};
 use crate::bvh::layout::wide::{ChildRef, LEAF_SIZE, Unit};
 use fearless_simd::Simd;
@@ -27,8 +28,7 @@ pub(crate) struct ExpandedLeaves {
 /// How the triangles of a meshlet are coded.
 struct LeafCoding {
     index_bits: u32,
-    id_bits: u32,
-    first_id: u32,
+    numbers: TriangleNumbers,
     sections: Sections,
 }
 
@@ -44,15 +44,19 @@ impl ExpandedLeaves {
         units: [Unit::ZERO; LEAVES],
         present: 0,
         triangles: [[0; 2]; MAX_LEAVES],
-        coding: LeafCoding { index_bits: 0, id_bits: 0, first_id: 0, sections: Sections::EMPTY },
+        coding: LeafCoding {
+            index_bits: 0,
+            numbers: TriangleNumbers::EMPTY,
+            sections: Sections::EMPTY,
+        },
     };
 
     /// Takes the leaves of a meshlet.
     #[inline(always)]
     pub(super) fn load(&mut self, header: &Header) {
         self.present = 0;
-        let &Header { index_bits, id_bits, first_id, .. } = header;
-        self.coding = LeafCoding { index_bits, id_bits, first_id, sections: header.sections() };
+        let &Header { index_bits, numbers, .. } = header;
+        self.coding = LeafCoding { index_bits, numbers, sections: header.sections() };
     }
 
     /// Notes which triangles a leaf has.
@@ -159,13 +163,12 @@ impl LeafCoding {
 
     #[inline(always)]
     fn expand_body(&self, words: &[u32], ends: [u8; 2], floats: &mut LeafFloats) {
-        let &LeafCoding { index_bits, id_bits, first_id, ref sections } = self;
+        let &LeafCoding { index_bits, ref numbers, ref sections } = self;
         let [first, last] = ends.map(u32::from);
 
         // ---- Triangles: one read each. Unused slots repeat the last triangle, as in the ordinary
         // tree.
         let vertex_mask = (1 << index_bits) - 1;
-        let id_mask = (1u64 << id_bits) - 1;
         let mut starts = [0; CORNERS];
         for slot in 0..LEAF_SIZE {
             let number = (first + slot as u32).min(last);
@@ -176,7 +179,7 @@ impl LeafCoding {
                 starts[LEAF_SIZE * corner + slot] =
                     sections.vertices + (vertex * sections.vertex) as usize;
             }
-            let id = first_id.wrapping_add((triangle >> (3 * index_bits) & id_mask) as u32);
+            let id = numbers.read(words, sections.groups, triangle >> (3 * index_bits));
             floats[4 * 9 + slot] = f32::from_bits(id);
         }
 

@@ -2,15 +2,18 @@
 //!
 //! ```text
 //! word 0      triangles − 1 (6 bits), vertices − 1 (8), nodes − 1 (4), leaves − 1 (5),
-//!             bits of a triangle number (6), whether vertices lie on edges (1)
+//!             bits of the range of the triangle numbers (6), whether vertices lie on edges (1)
 //! word 1      the lowest triangle number
 //! word 2      exponents of the boxes' lattice + 127 (8 bits each), bits of a vertex number (4)
 //! words 3–5   origin of the lattice
 //! words 6–8   smallest coordinates
-//! word 9      bits of the coordinates (6 each), words of the nodes (7)
-//! word 10     different coordinates, when each is stored once (8 each)
+//! word 9      bits of the coordinates (6 each), words of the nodes (7),
+//!             groups of the triangle numbers − 1 (6)
+//! word 10     different coordinates, when each is stored once (8 each),
+//!             bits of a triangle number in its group (5)
 //! then        the nodes: kinds of the children (4 bits each), planes (a byte each)
 //! then        without gaps: of each triangle, three vertex numbers and its number;
+//!             where the groups of triangle numbers start, unless there is only one;
 //!             the x, y and z that are stored once; of each vertex, x, y and z or their numbers,
 //!             or, on an edge, its axis (2 bits), its coordinate there, and two numbers
 //! ```
@@ -28,6 +31,7 @@ use super::boxes::Lattice;
 use super::coordinates::{Axis, Coordinates, Values};
 use super::cut::Part;
 use super::edges::{EdgeBits, EdgeCoder};
+use super::triangle_numbers::{NumberCoder, TriangleNumbers};
 use crate::bvh::build::{BuilderConfig, LeafCapacity, PrimRef, UNWATCHED, build_wide};
 use crate::bvh::layout::triangles::TriWriter;
 use crate::bvh::layout::wide::{
@@ -54,9 +58,7 @@ pub(super) struct Header {
     pub(super) vertices: u32,
     pub(super) nodes: u32,
     pub(super) leaves: u32,
-    /// Bits of a triangle number less the lowest one.
-    pub(super) id_bits: u32,
-    pub(super) first_id: u32,
+    pub(super) numbers: TriangleNumbers,
     /// Bits of a vertex number.
     pub(super) index_bits: u32,
     pub(super) lattice: Lattice,
@@ -77,16 +79,17 @@ impl Header {
             | (self.vertices - 1) << 6
             | (self.nodes - 1) << 14
             | (self.leaves - 1) << 18
-            | self.id_bits << 23
+            | self.numbers.range_bits << 23
             | u32::from(self.on_edges) << 29;
         let exponents =
             self.lattice.exponents.iter().rev().fold(0, |word, e| word << 8 | (e + 127) as u32);
         let [ox, oy, oz] = self.lattice.origin.map(f32::to_bits);
         let [x, y, z] = self.axes.map(|axis| axis.base);
         let (bits, entries) = (three(6, |axis| axis.bits), three(8, |axis| axis.entries));
-        let bits = bits | self.node_words << 18;
+        let bits = bits | self.node_words << 18 | (self.numbers.groups - 1) << 25;
+        let entries = entries | self.numbers.low_bits << 24;
         let exponents = exponents | self.index_bits << 24;
-        [counts, self.first_id, exponents, ox, oy, oz, x, y, z, bits, entries]
+        [counts, self.numbers.first, exponents, ox, oy, oz, x, y, z, bits, entries]
     }
 
     #[inline(always)]
@@ -103,8 +106,12 @@ impl Header {
             vertices: (words[0] >> 6 & 255) + 1,
             nodes: (words[0] >> 14 & 15) + 1,
             leaves: (words[0] >> 18 & 31) + 1,
-            id_bits: words[0] >> 23 & 63,
-            first_id: words[1],
+            numbers: TriangleNumbers {
+                first: words[1],
+                range_bits: words[0] >> 23 & 63,
+                groups: (words[9] >> 25 & 63) + 1,
+                low_bits: words[10] >> 24 & 31,
+            },
             index_bits: words[2] >> 24 & 15,
             lattice: Lattice {
                 origin: [words[3], words[4], words[5]].map(f32::from_bits),
@@ -123,6 +130,8 @@ pub(super) struct Sections {
     pub(super) triangles: usize,
     /// Bits of a triangle.
     pub(super) triangle: u32,
+    /// The starts of the groups of triangle numbers.
+    pub(super) groups: usize,
     pub(super) vertices: usize,
     /// Bits of a vertex.
     pub(super) vertex: u32,
@@ -138,6 +147,7 @@ impl Sections {
     pub(super) const EMPTY: Sections = Sections {
         triangles: 0,
         triangle: 0,
+        groups: 0,
         vertices: 0,
         vertex: 0,
         before_z: 0,
@@ -157,10 +167,11 @@ impl Header {
     /// The sections behind the nodes.
     #[inline(always)]
     pub(super) fn sections(&self) -> Sections {
-        let triangle = 3 * self.index_bits + self.id_bits;
+        let triangle = 3 * self.index_bits + self.numbers.number_bits();
         let [x, y, z] = &self.axes;
         let triangles = 32 * (HEADER_WORDS + self.node_words as usize);
-        let of_x = triangles + (self.triangles * triangle) as usize;
+        let groups = triangles + (self.triangles * triangle) as usize;
+        let of_x = groups + self.numbers.groups_bits() as usize;
         let of_y = of_x + x.value_bits() as usize;
         let of_z = of_y + y.value_bits() as usize;
         let vertices = of_z + z.value_bits() as usize;
@@ -171,6 +182,7 @@ impl Header {
         Sections {
             triangles,
             triangle,
+            groups,
             vertices,
             vertex,
             before_z,
@@ -216,6 +228,7 @@ pub(super) struct Encoder {
     first_use: Vec<u32>,
     values: Values,
     edges: EdgeCoder,
+    numbers: NumberCoder,
 }
 
 impl Encoder {
@@ -281,11 +294,7 @@ impl Encoder {
         let vertices = self.values[0].len() as u32;
         let index_bits = bits::width(vertices - 1);
 
-        // ---- Triangle numbers.
-        let first_id = ids.iter().copied().min().unwrap_or(0);
-        let last_id = ids.iter().copied().max().unwrap_or(0);
-        let id_bits = bits::width(last_id - first_id);
-
+        let numbers = self.numbers.choose(&ids);
         let mut sorted = [const { Vec::new() }; 3];
         let axes: [Axis; 3] = std::array::from_fn(|a| {
             let axis = Axis::choose(&self.values[a], &mut self.sorted);
@@ -305,8 +314,7 @@ impl Encoder {
             vertices,
             nodes: (tree.units.len() / NODE_UNITS) as u32,
             leaves: part.leaves.len() as u32,
-            id_bits,
-            first_id,
+            numbers,
             index_bits,
             lattice,
             axes,
@@ -316,8 +324,9 @@ impl Encoder {
         let mut out = Writer::new(&mut words);
         for (corners, id) in self.vertex_of_corner.chunks_exact(3).zip(&ids) {
             corners.iter().for_each(|&vertex| out.push(vertex, index_bits));
-            out.push(id - first_id, id_bits);
+            self.numbers.write(&numbers, *id, &mut out);
         }
+        self.numbers.write_groups(&numbers, &mut out);
         let once = if header.on_edges { self.edges.planes() } else { &sorted };
         axes.iter().zip(once).for_each(|(axis, once)| axis.write_values(once, &mut out));
         if header.on_edges {

@@ -3,7 +3,7 @@
 //! ```text
 //! byte 0     header: 128 bytes
 //!   0        the letters RTSVMESH
-//!   8        u32 version (5), u32 checksum of the header with zero in this place
+//!   8        u32 version (6), u32 checksum of the header with zero in this place
 //!   16       u64 length of the file, u64 byte of the table, u64 pages, u64 triangles,
 //!            u64 triangles that were left out
 //!   56       3 f64 origin
@@ -20,7 +20,7 @@
 //! ```
 //!
 //! Versions 1 and 2 had the numbers of meshlets in another order, and version 1 no attributes.
-//! Versions 3 and 4 had other headers of meshlets.
+//! Versions 3 and 4 had other headers of meshlets, and version 5 one group of triangle numbers.
 //!
 //! Checksums are CRC-32 (IEEE 802.3). The header is written last: a file without it was not
 //! finished.
@@ -31,7 +31,7 @@ use crate::paging::fields::{Fields, checksum, get, get_u32, get_u64};
 use glam::{DVec3, Vec3};
 
 pub(super) const MAGIC: &[u8; 8] = b"RTSVMESH";
-pub(super) const VERSION: u32 = 5;
+pub(super) const VERSION: u32 = 6;
 pub(super) const HEADER_BYTES: usize = 128;
 pub(super) const ENTRY_BYTES: usize = 64;
 /// Bytes of a unit of a page.
