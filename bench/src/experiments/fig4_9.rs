@@ -5,6 +5,7 @@ use super::Context;
 use super::wavelet_series::{PROGRAM, Step, has_room, steps};
 use crate::clock::{Clock, Sample};
 use crate::image::framing::Framing;
+use crate::memory;
 use crate::opengl::{Mesa, MesaFrames};
 use crate::plot::{Axis, Plot, Point, Series};
 use crate::record::{Record, Row};
@@ -44,6 +45,17 @@ pub(super) fn run(context: &mut Context<'_>, record: &mut Record) -> anyhow::Res
     record.column("rate", "Mray/s", "primary rays by median time");
     record.column("build", "s", "wall time of the acceleration structure");
     record.column("bytes_per_triangle", "B", "memory of the structure, without the mesh");
+    record.column(
+        "peak_bytes_per_triangle",
+        "B",
+        "what the heap grew by while building, at most: the mesh is not in it",
+    );
+    record.column(
+        "resident_bytes_per_triangle",
+        "B",
+        "what the program's resident memory grew by while building, at most, by the kernel; memory \
+         that it kept from before and used again is not in it",
+    );
     record.notes.push(
         "A frame through the renderer: one primary ray a pixel, headlight, matte material, no \
          secondary rays, from the \
@@ -107,6 +119,8 @@ struct Built {
     scene: Scene,
     build_secs: f64,
     bytes: usize,
+    peak_bytes: u64,
+    resident_bytes: Option<u64>,
 }
 
 /// The mesh with a tree of each kind that there is room for.
@@ -125,10 +139,12 @@ fn built(
             continue;
         }
         let options = BuildOptions { storage, ..BuildOptions::default() };
-        let scene = Scene::new(World::from_mesh(mesh.clone(), &options)?);
+        let ((world, peak_bytes), resident_bytes) =
+            memory::resident_during(|| memory::peak(|| World::from_mesh(mesh.clone(), &options)));
+        let scene = Scene::new(world?);
         let report = scene.world.report();
         let (build_secs, bytes) = (report.total.as_secs_f64(), report.bytes);
-        all.push(Built { storage, scene, build_secs, bytes });
+        all.push(Built { storage, scene, build_secs, bytes, peak_bytes, resident_bytes });
     }
     Ok(all)
 }
@@ -206,7 +222,12 @@ fn measure(
                 .with("threads", rayon::current_num_threads())
                 .with("rate", rays / wall.median / 1e6)
                 .with("build", one.build_secs)
-                .with("bytes_per_triangle", one.bytes as f64 / n as f64),
+                .with("bytes_per_triangle", one.bytes as f64 / n as f64)
+                .with("peak_bytes_per_triangle", one.peak_bytes as f64 / n as f64)
+                .with(
+                    "resident_bytes_per_triangle",
+                    one.resident_bytes.map(|bytes| bytes as f64 / n as f64),
+                ),
             None => row,
         });
     }
