@@ -17,8 +17,9 @@ const CORNERS: usize = 3 * LEAF_SIZE;
 /// The leaves of an expanded meshlet, some of them not yet expanded.
 pub(crate) struct ExpandedLeaves {
     units: [Unit; LEAVES],
-    /// The leaves that are in `units`.
+    /// The leaves that are in `units`, and those of them that have the numbers of their triangles.
     present: u32,
+    numbered: u32,
     /// First triangle and last triangle of each leaf that a ray has reached, or an expanded node
     /// names.
     triangles: [[u8; 2]; MAX_LEAVES],
@@ -43,6 +44,7 @@ impl ExpandedLeaves {
     pub(super) const EMPTY: ExpandedLeaves = ExpandedLeaves {
         units: [Unit::ZERO; LEAVES],
         present: 0,
+        numbered: 0,
         triangles: [[0; 2]; MAX_LEAVES],
         coding: LeafCoding {
             index_bits: 0,
@@ -54,7 +56,7 @@ impl ExpandedLeaves {
     /// Takes the leaves of a meshlet.
     #[inline(always)]
     pub(super) fn load(&mut self, header: &Header) {
-        self.present = 0;
+        (self.present, self.numbered) = (0, 0);
         let &Header { index_bits, numbers, .. } = header;
         self.coding = LeafCoding { index_bits, numbers, sections: header.sections() };
     }
@@ -70,16 +72,17 @@ impl ExpandedLeaves {
     #[inline(always)]
     pub(crate) fn with<S: Simd>(&mut self, simd: S, words: &[u32], leaf: ChildRef) -> &[Unit] {
         let number = leaf.unit() / TRI_LEAF_UNITS;
-        if self.present >> number & 1 == 0 {
-            self.expand(simd, words, number);
+        if self.numbered >> number & 1 == 0 {
+            self.expand::<S, true>(simd, words, number);
         }
         &self.units
     }
 
     /// A reference to leaf `number` with these triangles, which is expanded first where it is not.
     /// It has their count: whoever asks for all hits must not get the last triangle four times.
+    /// Their numbers are there with `NUMBERS`; else they may not be.
     #[inline(always)]
-    pub(crate) fn leaf<S: Simd>(
+    pub(crate) fn leaf<S: Simd, const NUMBERS: bool>(
         &mut self,
         simd: S,
         words: &[u32],
@@ -88,9 +91,10 @@ impl ExpandedLeaves {
         last: u32,
     ) -> ChildRef {
         let number = number.min(MAX_LEAVES - 1);
-        if self.present >> number & 1 == 0 {
+        let present = if NUMBERS { self.numbered } else { self.present };
+        if present >> number & 1 == 0 {
             self.set_triangles(number, first, last);
-            self.expand(simd, words, number);
+            self.expand::<S, NUMBERS>(simd, words, number);
         }
         ChildRef::leaf(TRI_LEAF_UNITS * number, (last - first) as usize + 1)
     }
@@ -104,7 +108,7 @@ impl ExpandedLeaves {
     /// The place of triangle `id` of the meshlet at `unit`, among the leaves that are expanded.
     #[inline(never)]
     pub(crate) fn place_of(&self, unit: usize, id: u32) -> TrianglePlace {
-        for leaf in (0..MAX_LEAVES).filter(|leaf| self.present >> leaf & 1 == 1) {
+        for leaf in (0..MAX_LEAVES).filter(|leaf| self.numbered >> leaf & 1 == 1) {
             let ids = leaf_triangle_ids(leaf_floats(&self.units, leaf_reference(leaf)));
             if let Some(slot) = ids.iter().position(|&i| i == id) {
                 return TrianglePlace::of_leaf(unit, leaf).in_slot(slot);
@@ -140,12 +144,13 @@ impl ExpandedLeaves {
     }
 
     #[inline(always)]
-    fn expand<S: Simd>(&mut self, simd: S, words: &[u32], leaf: usize) {
+    fn expand<S: Simd, const NUMBERS: bool>(&mut self, simd: S, words: &[u32], leaf: usize) {
         let units = &mut self.units[TRI_LEAF_UNITS * leaf..][..TRI_LEAF_UNITS];
         let floats: &mut [f32] = bytemuck::cast_slice_mut(units);
         let floats: &mut LeafFloats = floats.try_into().expect("a leaf's units");
-        self.coding.expand(simd, words, self.triangles[leaf], floats);
+        self.coding.expand::<S, NUMBERS>(simd, words, self.triangles[leaf], floats);
         self.present |= 1 << leaf;
+        self.numbered |= u32::from(NUMBERS) << leaf;
     }
 }
 
@@ -154,15 +159,26 @@ impl LeafCoding {
     // A function of its own, whose arguments overlap nowhere: what is written need not be read
     // again.
     #[inline(never)]
-    fn expand<S: Simd>(&self, simd: S, words: &[u32], ends: [u8; 2], floats: &mut LeafFloats) {
+    fn expand<S: Simd, const NUMBERS: bool>(
+        &self,
+        simd: S,
+        words: &[u32],
+        ends: [u8; 2],
+        floats: &mut LeafFloats,
+    ) {
         simd.vectorize(
             #[inline(always)]
-            || self.expand_body(words, ends, floats),
+            || self.expand_body::<NUMBERS>(words, ends, floats),
         );
     }
 
     #[inline(always)]
-    fn expand_body(&self, words: &[u32], ends: [u8; 2], floats: &mut LeafFloats) {
+    fn expand_body<const NUMBERS: bool>(
+        &self,
+        words: &[u32],
+        ends: [u8; 2],
+        floats: &mut LeafFloats,
+    ) {
         let &LeafCoding { index_bits, ref numbers, ref sections } = self;
         let [first, last] = ends.map(u32::from);
 
@@ -179,8 +195,10 @@ impl LeafCoding {
                 starts[LEAF_SIZE * corner + slot] =
                     sections.vertices + (vertex * sections.vertex) as usize;
             }
-            let id = numbers.read(words, sections.groups, triangle >> (3 * index_bits));
-            floats[4 * 9 + slot] = f32::from_bits(id);
+            if NUMBERS {
+                let id = numbers.read(words, sections.groups, triangle >> (3 * index_bits));
+                floats[4 * 9 + slot] = f32::from_bits(id);
+            }
         }
 
         // ---- Corners: one read each, where 64 bits suffice.

@@ -145,7 +145,12 @@ fn visit<S: Simd, L: LeafTest<S>>(
                 for _ in 0..2 {
                     let slot = rest.trailing_zeros() as usize & 7;
                     let (number, first, last) = node.leaf_in(slot);
-                    refs[slot] = expanded.leaves.leaf(simd, words, number, first, last).0;
+                    let leaves = &mut expanded.leaves;
+                    refs[slot] = if L::NUMBERS {
+                        leaves.leaf::<S, true>(simd, words, number, first, last).0
+                    } else {
+                        leaves.leaf::<S, false>(simd, words, number, first, last).0
+                    };
                     two |= 1 << slot;
                     rest &= rest - 1;
                     if rest == 0 {

@@ -99,6 +99,9 @@ pub(crate) trait LeafTest<S: Simd> {
     /// entered their boxes.
     const TOGETHER: bool = false;
 
+    /// Whether the numbers of triangles matter, beside their corners.
+    const NUMBERS: bool = true;
+
     /// Whether leaves are trees of their own, so that a far one is better left until nearer ones
     /// have been searched.
     const TREES: bool = false;

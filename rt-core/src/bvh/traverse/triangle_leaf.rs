@@ -182,6 +182,7 @@ impl<'r, T: TriangleTest> AnyLeaf<'r, T> {
 impl<S: Simd, T: TriangleTest> LeafTest<S> for AnyLeaf<'_, T> {
     type Query = AnyHit;
     const TOGETHER: bool = true;
+    const NUMBERS: bool = false;
 
     #[inline(always)]
     fn test_many(
