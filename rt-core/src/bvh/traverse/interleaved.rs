@@ -218,8 +218,7 @@ pub(crate) fn traverse_interleaved<'r, const N: usize, S: Simd, Q: RayQueue<'r, 
                 *lane = Lane::new(units, task, stack);
                 i += 1;
             } else {
-                // The last ray moves to the free place. By a swap, which writes both, rays of
-                // ambient occlusion took 1.07 times as long in a compact tree.
+                // The last ray moves to the free place. A swap would write both.
                 under_way -= 1;
                 if i < under_way {
                     lanes[i] = lanes[under_way];
