@@ -54,6 +54,21 @@ fn all_hits_and_closest_points_of_compact_trees_are_those_of_plain_ones() {
     }
 }
 
+/// Rays of occlusion expand leaves without the numbers of their triangles, and threads keep them.
+#[test]
+fn triangles_that_a_ray_of_occlusion_met_first_keep_their_numbers() {
+    for (name, mesh) in meshes() {
+        let [plain, compact] = both(BuildOptions::default(), |options| world(&mesh, options));
+        for ray in inward_rays(300, 7) {
+            assert_eq!(plain.occluded(&ray), compact.occluded(&ray), "{name}: {ray:?}");
+            assert_eq!(bits(plain.closest(&ray)), bits(compact.closest(&ray)), "{name}: {ray:?}");
+            compact.occluded(&ray);
+            let of = |w: &World| w.all_hits(&ray, 10_000).expect("fewer").len();
+            assert_eq!(of(&plain), of(&compact), "{name}: {ray:?}");
+        }
+    }
+}
+
 /// Instances that overlap, and meshes that would share one plain tree, far from zero and near it.
 #[test]
 fn instances_and_several_compact_meshes_have_the_hits_of_plain_ones() {
