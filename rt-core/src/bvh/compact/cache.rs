@@ -9,8 +9,8 @@ use std::cell::{Cell, RefCell};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Expanded meshlets per thread, as a power of two: 0.2 MiB. (With 256, rays of ambient occlusion
-/// took 1.04 times as long: most of what they expand is not met again, and the
-/// rest is in the second-level cache.)
+/// took 1.04 times as long: most of what they expand is not met again, and the rest is in the
+/// second-level cache.)
 const SLOTS_LOG2: u32 = 5;
 
 /// A key that no tree of this process has had.

@@ -181,9 +181,8 @@ mod tests {
         let tree = CompactBvh::build(mesh.triangles(), &frame, BuildQuality::Balanced, &UNWATCHED);
         let Ok(tree) = tree else { panic!("nobody stops it") };
         let units = tree.bvh.units;
-        let nodes = units[..].chunks_exact(NODE_UNITS).take(1);
-        let leaves = nodes.flat_map(|node| node[CHILD_ROW].bits().map(ChildRef));
-        let mut meshlets = leaves.filter(|child| child.is_leaf()).map(|child| child.unit());
+        let children = units[CHILD_ROW].bits().map(ChildRef).into_iter();
+        let mut meshlets = children.filter(|child| child.is_leaf()).map(|child| child.unit());
         let meshlet = meshlets.find(|&at| {
             let groups = Header::read(bytemuck::cast_slice(&units[at..])).numbers.groups;
             groups > 2 && bits::width(groups - 1) == bits::width(groups - 2)

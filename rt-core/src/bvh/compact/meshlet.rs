@@ -52,7 +52,7 @@ pub(super) const NODE: u32 = 8;
 pub(super) const NONE: u32 = 15;
 
 /// The fixed part of a meshlet.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Header {
     pub(super) triangles: u32,
     pub(super) vertices: u32,
